@@ -86,7 +86,7 @@ def test_end_posture_on_another_branch_is_an_error():
     wrist = np.array([np.cos(turns).sum(), np.sin(turns).sum()])
     bearing = np.arctan2(wrist[1], wrist[0])
     mirrored = [2 * bearing - end[0], -end[1], end[2] + 2 * (turns[1] - bearing)]
-    with pytest.raises(StartError, match="the end posture is on another branch"):
+    with pytest.raises(StartError, match="the end posture is on a different branch"):
         plan(end=mirrored)
 
 

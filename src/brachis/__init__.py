@@ -8,13 +8,13 @@
     result.plot()
 
 Planning           plan, plan_many, transcribe (the nonlinear program itself)
-Many plans         sweep, SweepResult: keys of a task varied over grids and draws, also on a cluster
+Many plans         sweep, SweepResult: keys of a task varied over grids or at random, also on a cluster
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (the included ones)
 A task             Task, load_task; examples (the included task files)
 Results            Result, Trajectory, Samples, Candidate, FinishedCandidate, Verification, BottleneckReport
-Recorded motions   import_motion, from a CSV file; compare with a plan: Comparison; compare_run: Tracking
+Recorded motions   import_motion (from a CSV file); compare (with a plan): Comparison; compare_run: Tracking
 Controllers        export, plan_for_controller, verify_run: RunReport; Profile, load_profile, profile_names
 Looking at it      Result.plot, plots, report, view, Result.bottleneck, bottleneck, verify_trajectory, export
 Errors             errors; BrachisError, InputError, PlanningError, PlausibilityWarning, SlowTimingWarning

@@ -3,7 +3,7 @@
 The tree of errors::
 
     BrachisError                    exit code 1
-    |-- PlanningError               the input was sound, and no plan could be made
+    |-- PlanningError               the input was sound, but no plan could be made
     |-- ClusterError                a cluster cannot be reached, was lost, or cannot run plans
     |-- NotBuiltError               the compiled kernel is missing or damaged
     |-- UnreachableError            a trial point of the optimiser is outside the branch
@@ -12,17 +12,17 @@ The tree of errors::
         |-- UrdfError               a URDF file
         |-- ResultFileError         a saved result
         |-- UnknownNameError        a name that does not exist
-        |-- LimitError              a limit that is missing or not usable
+        |-- LimitError              a limit that is missing or unusable
         |-- PathError               the prescribed path
         |-- StartError              the start or end posture
         |-- DecompositionError      a choice of redundant joints without a closed form
-        |-- PlausibilityError       implausible figures, if the plan is strict
-        `-- NotInstalledError       a library of an extra that is not installed
-    MissingAttributeError           an AttributeError that names the attribute that may be meant
+        |-- PlausibilityError       implausible figures that are treated as errors
+        `-- NotInstalledError       a missing library of an optional extra
+    MissingAttributeError           an AttributeError that suggests an attribute
     BrachisWarning                  a UserWarning
 
-Every message says what was found, what is allowed, where, and what to try; attributes hold the same facts.
-``exit_code`` is what the command line returns: 2 for wrong input, 1 if no plan could be made from sound input.
+Every message says what is wrong and where, what was found, what is allowed, and what to try; attributes hold the same
+facts. ``exit_code`` is that of the command line: 2 for wrong input, 1 if no plan could be made.
 
 Examples
 --------
@@ -52,10 +52,10 @@ class Remedy:
     current : float
         The value in the task.
     guess : float
-        A value that may be enough.
+        A value that may make a plan possible.
     unit : str
     is_known : bool
-        Whether the guess is known to be the smallest change that can be enough.
+        Whether it is known that no smaller change than the guess can be enough.
     """
 
     key: str
@@ -100,11 +100,11 @@ _NAMES_HERE = {
     }.items()
     for name in names.split()
 }
-"""Names in other libraries, each with the names used here; the first of these that exists is suggested."""
+"""Names in other libraries, with the names that brachis uses; the first of those that exists is suggested."""
 
 
 class Details(TypedDict, total=False):
-    """The facts that an error states besides the problem; see `BrachisError`."""
+    """The facts that an error states in addition to the problem; see `BrachisError`."""
 
     found: object
     allowed: object
@@ -131,7 +131,7 @@ class BrachisError(Exception):
     Attributes
     ----------
     remedies : tuple of Remedy
-        Numbers in the task to change. `brachis.plan` tries new values, and the hint names those that lead to a plan.
+        Numbers in the task to change. `brachis.plan` tests new values, and the hint names those that lead to a plan.
 
     Examples
     --------
@@ -167,7 +167,7 @@ class BrachisError(Exception):
         return type(self).__new__, (type(self), *self.args), self.__dict__
 
     def with_remedies(self, *remedies: Remedy) -> Self:
-        """Attach numbers of the task that may be changed, and return the error."""
+        """Attach numbers in the task that could be changed, and return the error."""
         self.remedies = remedies
         return self
 
@@ -194,7 +194,7 @@ class BrachisError(Exception):
 
 
 class BrachisWarning(UserWarning):
-    """A warning about something that is allowed, but that the user should know."""
+    """A warning about something that is allowed, but that the user should know about."""
 
 
 class InputError(BrachisError):
@@ -222,13 +222,13 @@ class UrdfError(InputError):
 
 
 _NOT_STRICT = (
-    "If these figures are intended, turn the error into warnings: strict: false in the task file, "
+    "If these figures are intended, turn the error into warnings with strict: false in the task file, "
     "brachis.plan(..., strict=False), or brachis plan --no-strict"
 )
 
 
 class PlausibilityError(InputError):
-    """Figures are implausible, and the plan is strict about them.
+    """Figures are implausible, and are treated as errors.
 
     Attributes
     ----------
@@ -248,9 +248,9 @@ class UnknownNameError(InputError):
     Attributes
     ----------
     kind : str
-        What was looked for, for example ``"joint"``.
+        Kind of name that was looked up, for example ``"joint"``.
     name : str
-        The unknown name; the first one if there are several.
+        The unknown name, or the first of several.
     valid : tuple of str
         The names that exist.
     """
@@ -287,7 +287,7 @@ def check_names(
 
 
 class LimitError(InputError):
-    """A limit is missing or not usable.
+    """A limit is missing or unusable.
 
     Attributes
     ----------
@@ -341,7 +341,7 @@ class DecompositionError(InputError):
     redundant_joints : tuple of str
         The requested choice.
     reasons : dict of str to str
-        The reason why each family that was tried does not fit.
+        For each family that was tried, the reason why it does not fit.
     available : tuple of tuple of str
         Choices of redundant joints of this robot and task space that do have a closed form.
     """
@@ -377,7 +377,7 @@ class ClusterError(BrachisError):
 
 
 class NotInstalledError(InputError):
-    """A library that an extra of brachis installs is missing.
+    """A library that belongs to an optional extra of brachis is not installed.
 
     Attributes
     ----------
@@ -418,9 +418,9 @@ class PlanningError(BrachisError):
 def nearest(
     name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Suggest the valid name that is meant by a word of other libraries, a misspelling, or a longer name.
+    """Suggest the valid name that a misspelling, a longer name, or a name from another library probably means.
 
-    If an attribute is asked for, functions elsewhere in brachis count as well.
+    If an attribute is wanted, functions elsewhere in brachis may be suggested too.
     """
     if not isinstance(name, str):
         return None
@@ -445,13 +445,13 @@ def nearest(
 def suggest(
     name: object, valid: Iterable[str], *, is_attribute: bool = False
 ) -> str | None:
-    """Return the question whether the `nearest` valid name is meant; None if no name is similar."""
+    """Return a question that suggests the `nearest` valid name; None if no name is similar."""
     near = nearest(name, valid, is_attribute=is_attribute)
     return f"Did you mean {near!r}?" if near else None
 
 
 class MissingAttributeError(AttributeError):
-    """An object has no such attribute; the message suggests one, which may also belong to a part of the object."""
+    """An object lacks an attribute; the message suggests another one, which may belong to a part of the object."""
 
     def __init__(self, instance: object, name: str) -> None:
         super().__init__()
@@ -471,7 +471,7 @@ class MissingAttributeError(AttributeError):
 
 
 def _attribute_meant(instance: object, name: str) -> str | None:
-    """Return the attribute of an object, or of one of its parts, that a name may stand for."""
+    """Return the attribute of an object, or of one of its parts, that a name may mean."""
     public = [entry for entry in dir(instance) if not entry.startswith("_")]
     for word in (name, *_NAMES_HERE.get(name.lower(), ())):
         if word in public or "." in word:

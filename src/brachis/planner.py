@@ -1,4 +1,4 @@
-"""Plan a motion: the steps of `plan` are written in the order in which they run.
+"""Functions that plan motions; the body of `plan` lists the steps in the order in which they run.
 
 `transcribe` stops before the solve; `plan_many` plans many tasks in several processes.
 """
@@ -52,7 +52,7 @@ from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import MotionSource, motion_of
 
 RobotOrTask = Source | Robot | None
-"""A robot or a task; either may be given by the name of a file."""
+"""A robot or a task; either may be given as a file name."""
 _OWN_KEYWORDS = (
     "start_from",
     "families",
@@ -78,25 +78,24 @@ def plan(
 ) -> Result:
     """Plan the minimum-time motion of a robot along a path.
 
-    ``plan(task)``, ``plan(robot, task)`` and ``plan(robot, path=..., start=..., task_space=...)`` are different ways to
-    say the same. Keywords given with a task change that task.
+    ``plan(task)``, ``plan(robot, task)`` and ``plan(robot, path=..., start=..., task_space=...)`` are three ways to
+    state the same problem. Keywords given with a task change that task.
 
     Parameters
     ----------
     robot_or_task : path, Robot, mapping, Task or None
         A robot: a `Robot`, a URDF file, or the name of an included robot (`brachis.robots`). It replaces the robot that
-        the task names; all other settings in the task's ``robot`` section (limits, gravity, frames, ...) are added to
-        it. If None, the task's own robot is used. If it is the only argument, it may also be a task, as described
-        below.
+        the task names; all other settings in the task's ``robot`` section (limits, gravity, frames, ...) still apply.
+        If None, the task's own robot is used. If it is the only argument, it may also be a task, as described below.
     task : path, mapping or Task, optional
         Task file, or its content.
     start_from : Result, Trajectory or path, optional
-        A motion, or its file, to start from in place of the search. It may belong to this task or to a similar one
-        (with other limits or another path). The optimum closest to it is found, in a fraction of the time. If the
-        motion cannot be used, or leads to no verified plan, the search continues as usual, and ``result.not_completed``
-        says so.
+        A known motion, or its file, from which the plan starts instead of a search. It may belong to this task or to a
+        similar one (with different limits or a different path). The planner finds the optimum closest to this motion,
+        in a fraction of the usual time. If the motion cannot be used, or leads to no verified plan, the search
+        continues as usual, and ``result.not_completed`` says so.
     families : sequence of Family, optional
-        Closed forms to try before the built-in ones.
+        Families of closed-form inverse kinematics to try before the built-in ones.
     own_limits : sequence of LimitModel, optional
         Limits of your own in addition to those of the task: objects whose ``bind(robot)`` returns a
         `brachis.limits.Limit`. They are not saved with the motion. Limits from installed packages are named in the task
@@ -106,10 +105,10 @@ def plan(
         name ``brachis``, stages at level INFO and iterations at DEBUG.
     progress : bool, optional
         Whether to show the progress on standard error, or below the cell in a notebook. By default it is shown only in
-        notebooks, and not if there is a listener.
+        notebooks, and only if there is no listener.
     check_advice : bool, optional
-        If no plan is found, whether to try the numbers that the error advises in further plans, for up to 20 s. If
-        False, the error names what to change, but not by how much.
+        If no plan is found, whether to test the values suggested by the error in further planning runs, for up to 20 s.
+        If False, the error names what to change, but not by how much.
     **keywords
         Keys of the task, without the names of their sections: ``path``, ``start``, ``task_space``, ``limits``,
         ``intervals``, ``effort``, ... `brachis.task.TaskKeywords` lists them all.
@@ -223,7 +222,7 @@ def _open_search(
     if has_charts(problem, decompositions):
         check_regular(problem.task, problem.task_map, problem.given_postures)
     else:
-        # Decompositions are computed here, so that faulty ones are reported before the path is checked.
+        # Decompositions are computed here, so that errors in them are reported before the path is checked.
         len(decompositions)
     check_within_reach(problem)
     return Search(problem, decompositions, deadline, report)
@@ -246,7 +245,7 @@ def _find_smoother(
 def read_arguments(
     first: RobotOrTask, task: Source | None, keywords: TaskKeywords
 ) -> tuple[Robot, Task]:
-    """Return the robot, and the task with all settings of the robot."""
+    """Return the robot, and the task with all of the robot's settings."""
     check_keywords(keywords, "plan", _OWN_KEYWORDS)
     section = keywords.get("robot")
     if is_robot(section):
@@ -296,12 +295,12 @@ def transcribe(
     Returns
     -------
     program : TaskProgram
-        ``program.guess`` is a first point x, ``program.names`` names the entries of x, and ``program.trajectory(x)``
-        returns the motion of a point, for `verify_trajectory`. Each phase has as many knot intervals as the task says.
-        With ``intervals: auto`` it has 10, or 12 if its speed is given, whereas `plan` chooses its own knots. With
-        ``knots: free`` the lengths of the intervals are variables.
+        ``program.guess`` is an initial point x, ``program.names`` names the entries of x, and ``program.trajectory(x)``
+        returns the motion that x describes, for `verify_trajectory`. Each phase has as many knot intervals as the task
+        says. With ``intervals: auto``, a phase has 10 intervals, or 12 if its speed is given, whereas `plan` chooses
+        the knots itself. With ``knots: free`` the lengths of the intervals are variables.
     family : str
-        Family of the closed form.
+        Name of the closed form's family.
 
     Raises
     ------
@@ -327,7 +326,7 @@ def transcribe(
 
 Outcome = Result | BrachisError
 OnProgress = Callable[[int, int, Outcome], None]
-"""Called after every plan with the number of finished plans, the total number, and the outcome."""
+"""Function called after every plan with the number of finished plans, the total number, and the outcome."""
 
 
 def plan_many(
@@ -345,14 +344,15 @@ def plan_many(
     tasks : iterable of path, mapping, Task, or pair of robot and task
         Each task in a form that `plan` accepts.
     jobs : int, optional
-        Number of processes; at most as many as there are processors are used.
+        Number of processes; it is limited to the number of processors.
     executor : Executor, optional
-        Runs the plans in place of these processes: a Dask client, or any ``concurrent.futures.Executor``, such as those
-        of mpi4py and parsl. Its workers read the tasks, so they need the files that the tasks name.
+        Object that runs the plans in place of these processes: a Dask client, or any ``concurrent.futures.Executor``,
+        such as those of mpi4py and parsl. Its workers read the tasks, so they need access to the files that the tasks
+        name.
     progress : bool or callable, optional
         If True, the number of finished plans is shown in the same way as the progress of `plan`; by default it is shown
-        in notebooks. A function is called after every plan, in the order of the tasks, with the number of finished
-        plans, the total number, and the outcome.
+        only in notebooks. If a function is given, it is called after every plan, in the order of the tasks, with the
+        number of finished plans, the total number, and the outcome.
     **keywords
         Keys to set in all the tasks, as for `plan`.
 
@@ -367,7 +367,7 @@ def plan_many(
     InputError
         A single task is given in place of a list, `jobs` is not a number of processes, or a keyword does not exist.
     KeyboardInterrupt
-        Ctrl-C ends all plans.
+        Ctrl-C was pressed, which ends all plans.
 
     Examples
     --------

@@ -63,7 +63,7 @@ def locate(
 
 
 def _is_name(source: str | os.PathLike[str]) -> bool:
-    """Return whether this is a robot's name, its first letters or a misspelling of it, and not the name of a file."""
+    """Return whether a text is a robot's name, its first letters or a misspelling of it, but not the name of a file."""
     known = names()
     path = Path(source)
     if source in known or path.suffix or len(path.parts) != 1 or is_file(path):

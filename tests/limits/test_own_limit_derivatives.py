@@ -85,7 +85,7 @@ def test_a_wrong_partial_derivative_is_in_the_message(partials, where, joint):
     assert caught.value.where == f"own_limits[0].partials.{where}"
     assert "arm sum" in str(caught.value)
     if joint:
-        assert f"by {where} of joint '{joint}'" in str(caught.value)
+        assert f"with respect to {where} of joint '{joint}'" in str(caught.value)
 
 
 def test_the_numbers_are_those_of_the_joint():

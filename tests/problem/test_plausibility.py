@@ -134,7 +134,7 @@ def test_damping_that_stands_for_a_simulator():
         for damping in (19, 21)
     ]
     text = chain_urdf(joints, tool=(0.4, 0.0, 0.0))  # 60 Nm at 3 rad/s
-    message = "the damping of the URDF takes more than the largest torque at the largest speed"
+    message = "the damping in the URDF needs more than the maximum torque at the maximum speed"
     assert issues_of(Robot.from_urdf("x", urdf_text=text)) == [
         ("robot.friction.viscous.j2", message)
     ]
@@ -160,7 +160,7 @@ def test_a_placeholder_that_is_scaled_stays_one():
 
 
 def test_lengths_in_mm():
-    message = "the distance from the joint before looks like mm"
+    message = "the distance from the previous joint looks like mm"
     assert issues_of(arm(length=400.0)) == [
         (f"URDF origin of {name}", message) for name in ("j2", "j3", "tool")
     ]
@@ -267,7 +267,7 @@ def test_warnings_are_emitted_and_kept_in_the_result():
     assert result.to_dict()["warnings"][:1] == [
         {
             "where": "robot.limits.scale.velocity",
-            "message": "the factor raises limits far beyond what was stated",
+            "message": "the factor raises limits far above the stated values",
             "found": "50",
             "usual": "0.1 to 1; a percentage is divided by 100",
             "advice": "",
@@ -579,7 +579,7 @@ def test_points_in_mm_or_in_another_order_do_not_start_where_the_tool_is():
         ),
         (
             points[:, ::-1],
-            "It looks like the order y, x: the tool is there if they are read so",
+            "The numbers may be in the order y, x: read in this order, they are where the tool is",
         ),
     ):
         content = brachis.load_task(task(path=brachis.fit_path(given)))

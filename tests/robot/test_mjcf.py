@@ -96,7 +96,7 @@ def test_limits_and_what_has_no_counterpart(tmp_path):
     assert robot.friction.armature == pytest.approx([0.1, 0.1, 0.1])
     assert robot.friction.viscous == pytest.approx([0.3, 0.3, 0.3])
     assert robot.friction.coulomb == pytest.approx([0.0, 0.2, 0.0])
-    assert "left out: collision shapes (5), control laws of actuators (1)" in warning
+    assert "counterpart: collision shapes (5), control laws of actuators (1)" in warning
     shown = '<geom type="box" size="1 1 1" contype="0" conaffinity="0"/>'
     text = ARM.replace('<geom type="box" size="1 1 1"/>', shown)
     _, warning = read(tmp_path, text, tool_frame="tip", limits=LIMITS)

@@ -152,9 +152,9 @@ def test_friction_is_the_urdfs_unless_the_task_says_otherwise():
         assert_array_equal(robot.friction.viscous, viscous)
         assert_array_equal(robot.friction.coulomb, coulomb)
     said = in_use(of(DAMPED))["viscous friction"]
-    assert said == "j1 7 Nm s/rad, j2 0 N s/m (as the URDF states it)"
+    assert said == "j1 7 Nm s/rad, j2 0 N s/m (as in the URDF)"
     off = in_use(of(DAMPED, friction={"viscous": None}))
-    assert off["viscous friction"] == "none (other than the URDF's)"
+    assert off["viscous friction"] == "none (different from the URDF)"
 
 
 def test_friction_of_the_urdf_that_cannot_be():
@@ -172,7 +172,8 @@ def test_a_gripper_that_its_friction_holds_is_left_out_as_the_message_says():
     with pytest.raises(InputError, match="joint 'j3' is not below") as caught:
         of(text, friction=held)
     link = re.search(
-        r"end the chain at (\S+) by robot.tool_frame or --tool-frame", caught.value.hint
+        r"end the chain at (\S+) with robot.tool_frame or --tool-frame",
+        caught.value.hint,
     )[1]
     assert of(text, tool_frame=link).joint_names == ("j1", "j2")
     with pytest.raises(InputError, match="joint 'j1' is not below") as caught:

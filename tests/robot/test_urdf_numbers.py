@@ -66,14 +66,18 @@ def test_what_is_no_finite_number_is_refused_with_its_place(old, new, words, bad
 @pytest.mark.parametrize(
     "old, new, unit",
     [
-        ('value="2.0"', 'value="1,5"', "a finite number of at most 1e+12 in size, kg"),
-        ('value="2.0"', 'value="1e13"', "at most 1e+12 in size, kg"),
+        (
+            'value="2.0"',
+            'value="1,5"',
+            "a finite number of at most 1e+12 in magnitude, kg",
+        ),
+        ('value="2.0"', 'value="1e13"', "at most 1e+12 in magnitude, kg"),
         ("effort='60.0'", "effort='10Nm'", "a finite number, Nm or N"),
         ("<axis xyz='0.0 0.0 1.0'/>", "<axis xyz='0, 0, 1'/>", "3 finite numbers"),
         (
             "xyz='0.4 0.0 0.0'",
             "xyz='0.4m 0.0m 0.0m'",
-            "3 finite numbers separated by spaces of at most 1e+12 in size, m",
+            "3 finite numbers separated by spaces of at most 1e+12 in magnitude, m",
         ),
     ],
 )

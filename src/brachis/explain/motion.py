@@ -1,4 +1,4 @@
-"""What holds a planned motion back, from the multipliers of its own optimum, without a further solve."""
+"""What limits a planned motion, found from the multipliers of its own optimum without a further solve."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from brachis.problem.problem import Problem
 from brachis.trajectory.sensitivities import Sensitivities, Sensitivity
 
 _BALANCED = 0.02
-"""Fraction of the gradient that multipliers may leave unbalanced: beyond it, timings of the motion are more
-accurate."""
+"""Maximum fraction of the gradient that multipliers may leave unbalanced. If they leave more, timings of the motion are
+more accurate."""
 
 
 def explain_motion(
     problem: Problem, motion: SolvedProgram, optimum: SolvedProgram
 ) -> Sensitivities:
-    """Derive what limits and figures of the task cost, and what different demands would save.
+    """Derive the time that limits and figures of the task cost, and the time that different demands would save.
 
     Parameters
     ----------
@@ -37,18 +37,19 @@ def explain_motion(
     motion : SolvedProgram
         `FinishedCandidate.refined`.
     optimum : SolvedProgram
-        `FinishedCandidate.optimum`. A limit costs the same fraction of its end time as of the end time of the motion.
+        `FinishedCandidate.optimum`. A limit is assumed to cost the same fraction of this program's end time as of the
+        motion's end time.
 
     Returns
     -------
     Sensitivities
-        They come from timings of the joint path if splines were laid along its timing, and no program over time
-        balances the gradient.
+        The sensitivities come from timings of the joint path if splines were laid along its timing and no program over
+        time balances the gradient.
 
     Raises
     ------
     UnreachableError
-        A collocation point is out of the branch's reach.
+        A collocation point is outside the branch.
     """
     program = optimum.program
     x = optimum.report.x
@@ -83,7 +84,7 @@ def _find_multipliers(
 def _merge_figures(
     costs: Iterable[Sensitivity], time_ratio: float
 ) -> tuple[Sensitivity, ...]:
-    """Add up the costs of figures with the same name, times a ratio: some limits follow from process speeds."""
+    """Add up the costs of figures with the same name, multiplied by a ratio; some limits follow from process speeds."""
     joined: dict[tuple[str, str | None], Sensitivity] = {}
     for entry in costs:
         name = str(entry.label), entry.side

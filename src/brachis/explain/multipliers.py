@@ -5,7 +5,7 @@ At an optimum the gradient of t_E is a combination of the slopes of the active r
     grad t_E = sum_i w_i p_i,    w_i >= 0,
 
 where p_i is the gradient of a row or variable at its lower bound, or the negative gradient at its upper bound. The norm
-of the remainder, relative to that of the gradient, measures how far a solution is from being stationary. The
+of the remainder, divided by the norm of the gradient, measures how far a solution is from being stationary. The
 multipliers are those of the solver if they balance the gradient; otherwise they are found by least squares.
 
 If the slopes are linearly dependent, many sets of multipliers balance the gradient. The set that is valid for a
@@ -23,7 +23,7 @@ import numpy as np
 from brachis.optimise.program import Program
 
 _INDEPENDENT = 1e-9
-"""Length below which a slope, or its part that is independent of the slopes before it, counts as rounding."""
+"""Length below which a slope, or the part of it that is independent of earlier slopes, counts as a rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class ActiveSet:
     signs : (a,) ndarray
         1 at a lower bound, -1 at an upper one.
     equalities : int
-        Number of rows and variables that are at both bounds, each with two slopes.
+        Number of rows and variables that are at both of their bounds; each has two slopes.
     """
 
     slopes: np.ndarray
@@ -56,7 +56,7 @@ class ActiveSet:
         Raises
         ------
         UnreachableError
-            A collocation point is out of the branch's reach.
+            A collocation point is outside the branch.
         """
         from scipy import sparse
 
@@ -81,8 +81,8 @@ class ActiveSet:
 
     @cached_property
     def dependent(self) -> bool:
-        """Whether several sets of multipliers may balance a gradient; those of equalities may have either sign."""
-        # A slope that depends on those before it leaves nothing on the diagonal.
+        """Whether several sets of multipliers may balance a gradient; for equalities they may have either sign."""
+        # A slope that depends on earlier slopes leaves a zero on the diagonal.
         diagonal = np.diag(np.linalg.qr(self.slopes.T, mode="r"))
         remaining = np.count_nonzero(np.abs(diagonal) > _INDEPENDENT)
         return bool(remaining < len(self.slopes) - self.equalities)
@@ -90,7 +90,7 @@ class ActiveSet:
     def weights_of(
         self, gradient: np.ndarray, multipliers: np.ndarray | None
     ) -> np.ndarray:
-        """Return weights, (p,), from a solver's multipliers of all rows, (c,); those of variables balance the rest.
+        """Return weights, (p,), from a solver's multipliers of all rows, (c,); weights of variables balance the rest.
 
         Without multipliers, these are the weights that balance the gradient best, from non-negative least squares
         (Lawson and Hanson).
@@ -122,8 +122,8 @@ class Multipliers:
     source : str
         ``"solver"`` or ``"least squares"``.
     residual : float
-        Norm of the part of the gradient that the weights do not balance, relative to that of the gradient; 1 if nothing
-        is balanced.
+        Norm of the part of the gradient that the weights do not balance, divided by the norm of the gradient; 1 if
+        nothing is balanced.
     """
 
     active_set: ActiveSet
@@ -132,7 +132,7 @@ class Multipliers:
     residual: float
 
     def change(self, relaxation: np.ndarray, side: float | None = None) -> float:
-        """Return the directional derivative of t_E if bounds are relaxed.
+        """Return the directional derivative of t_E for a relaxation of bounds.
 
         The residual is the fraction of the gradient that the weights do not balance. Multipliers that contribute no
         more than this fraction to the balanced gradient cannot be distinguished from zero, and count as 0.
@@ -140,7 +140,7 @@ class Multipliers:
         Parameters
         ----------
         relaxation : (c,) ndarray
-            Rates >= 0 at which the bounds of every row move outwards, dimensionless.
+            Rate, >= 0, at which the bounds of each row move outwards, dimensionless.
         side : {1, -1}, optional
             If given, only lower (1) or only upper (-1) bounds move.
 
@@ -165,8 +165,8 @@ class Multipliers:
         from scipy.optimize import linprog
         from scipy.sparse import csc_array
 
-        # Of all weights that balance as much, take those that promise the least gain. The stubs do not know sparse
-        # matrices.
+        # Of all weights that balance the gradient equally well, use those that promise the least gain. The type stubs
+        # do not cover sparse matrices.
         columns = csc_array(slopes.T)
         modest = linprog(rates, A_eq=columns, b_eq=self.weights @ slopes).x  # type: ignore[call-overload]
         return -float(rates @ (self.weights if modest is None else modest))
@@ -191,14 +191,14 @@ def multipliers_of(
     Raises
     ------
     UnreachableError
-        A collocation point is out of the branch's reach.
+        A collocation point is outside the branch.
     """
     gradient = program.gradient(x)
     sources = {"solver": of_solver, "least squares": None}
     if of_solver is None:
         del sources["solver"]
     tried = []
-    # A row that is close to its bound without being active would count as one that becomes active within any step.
+    # A row that is close to its bound but not active would count as a row that becomes active within any step.
     for near in (1e-8, 1e-7, 1e-6, 1e-5):
         active_set = ActiveSet.at(program, x, near)
         for source, of_rows in sources.items():

@@ -1,4 +1,4 @@
-"""The time that the motion would save if the task demanded less: no wait, no stop, no rest, another end posture.
+"""The time that the motion would save if the task demanded less: no wait, no stop, no rest, or another end posture.
 
 The cost of a stop or of rest comes from timings of the same joint path. The cost of a posture comes from the optimum,
 to first order.
@@ -25,16 +25,17 @@ from brachis.trajectory.sensitivities import Accuracy, TaskSaving
 _PLACES = 400
 """Number of points at which the joint path of a phase is timed: the cost of a stop is then accurate to within 1 %."""
 _RAMPS = (slice(3), slice(-3, None))
-"""Breaks of the two intervals beside rest, within which an acceleration that is zero at rest costs time. On 15 motions,
-the estimates were 40 to 129 % of what planning again saved, with a median of 95 %; with one interval they were
-lower."""
+"""Breaks of the two intervals next to rest, in which an acceleration that must be zero at rest costs time. On 15
+motions, the estimated savings were 40 to 129 % of the savings found by planning again, with a median of 95 %; with one
+interval, the estimates were lower."""
 _RANGE_SHARE = 1e-3
 """Fraction of a joint's range by which a posture is changed. On 20 tasks, the estimated saving was up to 12 % off, with
-a median of 2 %. With a fraction of 1 % it was 4 to 23 % off on six tasks, and entirely wrong on one."""
+a median of 2 %. With a fraction of 1 %, it was 4 to 23 % off on six tasks, and entirely wrong on one task."""
 _SHARE_OF_SPEED = 0.1
-"""Fraction by which the speed at an end is raised; from rest, a fraction of the mean speed."""
+"""Fraction by which the speed at an end of the path is raised; if the tool rests there, a fraction of the mean
+speed."""
 _SELF_MOTION_STEP = 1e-5
-"""Change of a posture for a derivative by differences, m or rad."""
+"""Change of a posture by which a derivative is computed from differences, m or rad."""
 
 PhasePoint = tuple[Phase, np.ndarray]
 """A phase and its variables."""
@@ -43,7 +44,7 @@ PhasePoint = tuple[Phase, np.ndarray]
 def task_savings(
     problem: Problem, motion: SolvedProgram, answer: OptimalMotion
 ) -> tuple[TaskSaving, ...]:
-    """List what different demands would save, the largest savings first; demands that save nothing are left out.
+    """List the time that different demands would save, largest first; demands that save nothing are left out.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def task_savings(
 
 
 def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
-    """List how long the task's waits take."""
+    """List the duration of each wait in the task."""
     for leg in problem.legs:
         yield TaskSaving(f"without the dwell at s = {leg.end:.4g}", leg.dwell)
 
@@ -73,7 +74,7 @@ def _list_dwells(problem: Problem) -> Iterator[TaskSaving]:
 def _list_stops(
     problem: Problem, phase_points: list[PhasePoint]
 ) -> Iterator[TaskSaving]:
-    """Bound the time that the motion would save along the same joint path without each of its stops."""
+    """Compute a bound on the time that the motion would save along the same joint path without each of its stops."""
     for number, leg in enumerate(problem.legs[:-1]):
         if not leg.stops:
             continue
@@ -88,9 +89,9 @@ def _list_stops(
 
 
 def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
-    """Derive the time that would be saved if the tool were faster at the ends of the path, or moved slowly there.
+    """Derive the time that would be saved if the tool moved faster at the ends of the path, or slowly where it rests.
 
-    The redundant joints stay at rest there, although a motion that passes an end may move them too.
+    In this estimate, the redundant joints stay at rest there, although a motion that passes an end may move them too.
     """
     boundary = problem.task.boundary
     if boundary.periodic:
@@ -114,7 +115,7 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
 def _list_rest(
     problem: Problem, phase_points: list[PhasePoint]
 ) -> Iterator[TaskSaving]:
-    """Estimate the time that the motion would save if its accelerations could jump where it rests."""
+    """Estimate the time that the motion would save if its accelerations could jump where it is at rest."""
     spline = problem.task.spline
     order = max((limit.order for limit in problem.limits), default=0)
     if spline.vanishing == 1 or order > 2:  # limits on jerk need a smooth acceleration
@@ -133,7 +134,7 @@ def _list_rest(
 
 
 def _list_postures(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
-    """Derive the time that self-motions of the given postures at the ends would save."""
+    """Derive the time that would be saved if a self-motion changed the given postures at the ends."""
     if problem.task.boundary.periodic or isinstance(problem.task_map, JointSpace):
         return
     robot = problem.robot

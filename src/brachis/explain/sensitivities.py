@@ -6,7 +6,7 @@ one of these figures is relaxed (`brachis.limits.Bound`). With the multipliers w
     dt_E / d(figure) = -sum w d.
 
 For a motion along the timing of its joint path, the multipliers are those of the program over time that improved this
-joint path. If there was no such program, the joint path is timed again with every limit slightly raised.
+joint path. If there was no such program, the joint path is timed again with each limit in turn slightly raised.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from brachis.trajectory.sensitivities import (
 )
 
 LimitFigure = tuple[Label, str | None]
-"""A figure that a user could change: what is limited, and which end of its range."""
+"""A figure that a user could change: the label of the limited quantity, and the end of its range."""
 LimitBound = tuple[Limit, Bound]
 _RAISED = 1e-3
 """Fraction by which limits are raised."""
 _NEAR = 0.02
-"""Distance from a limit, as a fraction of it, within which the limit may hold a joint path back."""
+"""Distance from a limit, as a fraction of the limit, within which the limit may hold a joint path back."""
 _LEAST_COST = 1e-9
 """Cost, s, below which a branch boundary is not listed."""
 
 
 def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
-    """List the figures of a program's limits, each with all its bounds: phases may have limit objects of their own."""
+    """List the figures of a program's limits, each with all its bounds; every phase may have its own limit objects."""
     figures: defaultdict[LimitFigure, list[LimitBound]] = defaultdict(list)
     for limit in program.limits:
         for bound in limit.bounds:
@@ -48,7 +48,7 @@ def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
 
 
 def _figure(limit: Limit, bound: Bound) -> LimitFigure:
-    """Name what a user would change to move a bound."""
+    """Identify the figure that a user would change to move a bound."""
     label = limit.labels[bound.column]
     if label.cause:
         label = label_of_speed(label.cause, bound.figure, label.key)
@@ -61,7 +61,7 @@ def label_of_speed(cause: str, speed: float, key: str) -> Label:
 
 
 def sensitivities_at(program: Program, multipliers: Multipliers) -> Sensitivities:
-    """Derive what every limit costs from a program and the multipliers at its solution."""
+    """Derive the cost of every limit from a program and the multipliers at its solution."""
     costs = []
     boundaries = []
     for (label, side), bounds in figures_of(program).items():
@@ -95,8 +95,8 @@ def _sensitivity(label: Label, bound: Bound, saved_per_unit: float) -> Sensitivi
 def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     """Time the joint path of a motion again with each limit raised by 0.1 %.
 
-    The result is exact if the joint path is given. If it is free, two limits may be active at once all along it.
-    Raising one of them then saves nothing unless the joint path changes too.
+    The result is exact if the joint path is given. If the joint path is free, two limits may be active at once along
+    all of it. Raising one of these limits then saves nothing unless the joint path changes too.
 
     Parameters
     ----------

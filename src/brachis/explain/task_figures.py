@@ -1,9 +1,9 @@
 """The cost of figures of the task that are not bounds of rows in a program: process speeds and blends.
 
 At an optimum the Lagrangian L = t_E - sum w_i p_i does not change to first order with the free variables. So dt_E is
-the change of L if such a figure changes and the free variables stay the same; durations that follow from a speed change
-with it. If the joint path follows from the path of the tool and only its timing is optimal, dt_E is the change of the
-least time along it.
+the change of L if such a figure changes and the free variables stay the same. Durations that follow from a given speed
+change with that speed. If the joint path follows from the path of the tool and only its timing is optimal, dt_E is the
+change of the least time along it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ from brachis.trajectory.sensitivities import Sensitivity
 Value = Callable[[Program, np.ndarray], float]
 """A function of a program and a point, (v,), that changes by as much as t_E, s, if a figure of the task changes."""
 STEP_OF_TIMING = 1e-2
-"""Fraction by which figures are changed in timings, whose stations cause an error of about 1e-6 of the time."""
+"""Fraction by which figures are changed in timings; the stations of a timing cause an error of about 1e-6 of its
+time."""
 PROCESS_SPEED_KEY = "tool_limits.process_speed"
 """Key of the task that lists the process speeds that are not given by segments."""
 
@@ -50,8 +51,8 @@ PROCESS_SPEED_KEY = "tool_limits.process_speed"
 def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
     """Return the Lagrangian as a function of a program and a point.
 
-    It has only the rows of limits and links, because the others change if the tool moves at an end. Limits without
-    active rows are left out: distances of bodies take long to compute.
+    It has only the rows of limits and links, because the other rows change if the tool moves at an end of the path.
+    Limits without active rows are left out, because distances between bodies take long to compute.
     """
     active = multipliers.active_set
     of_rows = multipliers.weights[: len(active.rows)]
@@ -134,12 +135,12 @@ class OptimalMotion:
 
     @cached_property
     def _unchanged(self) -> float:
-        """Value of the solution itself."""
+        """`value` at the solution of the unchanged problem, s."""
         return self.value(self.program, self.x)
 
 
 def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
-    """Prescribe as many derivatives as before: those of redundant joints stay zero if the tool now moves at an end."""
+    """Prescribe as many derivatives as before; for redundant joints they stay zero if the tool now moves at an end."""
     sides: dict[str, Any] = {}
     for side in ("start", "end"):
         pairs = zip(getattr(before, side), getattr(after, side), strict=True)
@@ -151,7 +152,7 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
 
 
 def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
-    """Carry a motion, (v,), over to a phase that travels the same leg at other path coordinates, or another speed."""
+    """Carry a motion, (v,), over to a phase that travels the same leg at other path coordinates or another speed."""
     carried = x.copy()
     if target.time_law is not None:
         carried[0] = target.time_law.duration
@@ -164,7 +165,7 @@ def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:
 
 
 TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
-"""A figure of a task whose cost is not known yet, and a function from a value of it to the changed problem."""
+"""A figure of a task whose cost is not known yet, and a function that returns the problem with a new value of it."""
 
 
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
@@ -181,7 +182,7 @@ def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
 
 
 def _speeds(problem: Problem) -> Iterator[TaskFigure]:
-    """List process speeds; parts of the path with the same speed share one figure."""
+    """List process speeds; parts of the path with equal speeds share one figure."""
     limits = problem.task.tool_limits
 
     def change(before: float, after: float) -> Problem:
@@ -212,7 +213,7 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _blends(problem: Problem) -> Iterator[TaskFigure]:
-    """List blends; those of the same size share one figure, and so do all blends along the points of one file."""
+    """List blends; blends of the same size share one figure, and so do all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
     places: dict[int | None, tuple[float, float]] = {}
@@ -229,7 +230,7 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
             groups[source if is_of_file else segment.blend].append(number)
 
     def change(numbers: list[int], before: float, after: float) -> Problem:
-        """Enlarge the blends after some segments in the ratio of two sizes, m."""
+        """Return the problem with the blends after some segments scaled by the ratio of two sizes, m."""
         path = list(segments)
         for number in numbers:
             size = (path[number].blend or 0.0) * after / before
@@ -251,7 +252,7 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
 
 
 def _with_task(problem: Problem, task: Task) -> Problem:
-    """Return the problem of another task, with its path, and the process speeds and feed rates on it.
+    """Return the problem with another task, and with the path, process speeds and feed rates of this task.
 
     Raises
     ------

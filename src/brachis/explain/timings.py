@@ -1,4 +1,4 @@
-"""Timings of the joint path of a phase, or of the part beside one of its ends."""
+"""Timings of the joint path of a phase, or of the part next to one of its ends."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from brachis.timing import Course, TimedCourse
 
 FINE_PLACES = 3000
 """Number of points at which a joint path is timed if a limit or a figure changes by 1 % or less. With 2000 points,
-three figures of four motions differed by 1.2 to 1.5 % from those with 4000."""
+three figures of four motions differed by 1.2 to 1.5 % from the results with 4000 points."""
 
 
 def lay_course(
@@ -23,7 +23,7 @@ def lay_course(
 ) -> TimedCourse | None:
     """Return the timed course of a motion, (v,), over some intervals of its phase.
 
-    It is None if the speed of the phase is given, or if the motion leaves the joint map.
+    Return None if the speed of the phase is given, or if the motion leaves the joint map.
     """
     if phase.time_law is not None:
         return None
@@ -45,8 +45,8 @@ def least_time(
 ) -> float:
     """Return the least time along a joint path, s; NaN if there is none.
 
-    The speeds at the ends are those of the motion; the speed at one end, 0 or -1, may be free. Limits may be
-    `narrower`; see `PhasePlane.narrow`.
+    The speeds at the ends are those of the motion, except that the speed at one end, 0 or -1, may be free. Limits may
+    be `narrower`; see `PhasePlane.narrow`.
     """
     if course is None:
         return np.nan

@@ -1,6 +1,7 @@
 """Limits on the motion, listed in `LIMIT_BUILDERS`.
 
-A limit is a function of q, qdot, qddot and s; a few also depend on qdddot. A new kind of limit touches these places:
+A limit is a function of q, qdot, qddot and s; a few also depend on qdddot. To add a new kind of limit, change these
+places:
 
 - A joint limit: a row of `brachis.task.LIMIT_KINDS` and its keyword in `LimitKeywords`, both in `task/limit_kinds.py`;
   a class in `JOINT_LIMITS` of `joint.py`; a formula in `JOINT_CHECKS` of `verify/limits/joint.py`.
@@ -12,8 +13,7 @@ A limit is a function of q, qdot, qddot and s; a few also depend on qdddot. A ne
 - A limit on the tool or the scene: a field of its model in `task`; a class here with a line in `LIMIT_BUILDERS`; a
   formula in `verify/limits`, in a table that `LIMIT_CHECKS` contains.
 
-No other code asks for the kind of a limit. The ranges of the joints are the exception: postures and turns are chosen
-within them.
+No other code depends on the kind of a limit, except that postures and turns are chosen within the joint ranges.
 
 Examples
 --------
@@ -57,11 +57,11 @@ from brachis.robot.custom_limits import LimitModel, list_models
 from brachis.task import Task
 
 Build = Callable[[Robot, Task], Limit | None]
-"""Builds the limit of a kind for a task on a robot; None if nothing is limited."""
+"""Function that builds the limit of one kind for a task on a robot; it returns None if nothing is limited."""
 
 
 def _build_from(limit: Callable[[Robot, Task, float], Limit], key: str) -> Build:
-    """Return a function that builds a limit of a figure, which the task gives under a dotted key."""
+    """Return a function that builds a limit from one figure, which the task gives under a dotted key."""
 
     def build(robot: Robot, task: Task) -> Limit | None:
         """Build the limit; None if the figure is missing, or if it limits nothing on this robot."""
@@ -105,7 +105,7 @@ def limits_of(
     robot : Robot
     task : Task
     own_limits : sequence of LimitModel, optional
-        Limits besides the built-in ones and those under the task's ``custom_limits``.
+        Limits in addition to the built-in ones and those under the task's ``custom_limits``.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:
 
 
 def describe_guarantees(limits: Iterable[Limit]) -> dict[str, str]:
-    """Describe where each limit holds, by the name of the limit."""
+    """Describe where each limit is guaranteed to be met; the keys are the names of the limits."""
     return {limit.name: limit.guarantee.value for limit in limits}
 
 

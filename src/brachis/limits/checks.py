@@ -31,13 +31,13 @@ _COUNT = 6
 _STEP = 1e-3
 """Step of the differences, as a fraction of the range of the motion; large enough for single precision."""
 _FURTHEST = 1.0
-"""Largest speed, acceleration and jerk at the moments, rad or m and seconds."""
+"""Largest speed, acceleration and jerk at the random moments, in rad or m, and seconds."""
 _PRECISION = 2e-3
-"""Largest allowed difference between the stated slope and the computed one, as a fraction of the largest slope."""
+"""Maximum difference between the stated slope and the computed one, as a fraction of the largest slope."""
 _ROUNDING = 1e-3
 """Slopes smaller than this fraction of the values count as zero."""
 _MARGIN = 5.0
-"""Factor on the difference between the slopes with both steps, which is allowed as well."""
+"""Factor on the difference between the slopes found with the two step sizes; the product is allowed as an error too."""
 
 
 def _is_label(label: object) -> bool:
@@ -117,8 +117,8 @@ _MEMBERS: dict[str, tuple[str, Callable[[Any, Limit], object]]] = {
     "refusal": ("a text", _is_text),
 }
 """Members of a limit, each with the allowed values in words, and with a function of the value and the limit that tells
-whether the value is allowed. The function may raise TypeError or ValueError if not. The labels and the arrays of bounds
-are checked before."""
+whether the value is allowed. For a value that is not, the function may also raise TypeError or ValueError. The labels
+and the arrays of bounds are checked beforehand."""
 
 
 def build_own_limits(
@@ -132,7 +132,7 @@ def build_own_limits(
     Parameters
     ----------
     models : mapping of str to LimitModel
-        The user's limits, by the places where they are given, for messages.
+        The user's limits. The keys are the places where the limits are given, for messages.
     robot : Robot
     existing : sequence of Limit
         The limits that exist already. Labels must be unique.
@@ -185,7 +185,7 @@ def build_own_limits(
 
 
 def _check_members(limit: Limit) -> None:
-    """Refuse a limit that lacks a member, or has a member that is not allowed."""
+    """Refuse a limit that lacks a member, or has a member with a value that is not allowed."""
     required = ("kind", "labels", "lower", "upper")
     missing = [name for name in required if not hasattr(limit, name)]
     if missing:
@@ -231,9 +231,9 @@ def _check_members(limit: Limit) -> None:
 
 
 def _check_functions(limit: Limit, robot: Robot) -> None:
-    """Refuse values and partial derivatives that have the wrong type or shape, are not finite or contradict each other.
+    """Refuse values and partial derivatives of the wrong type or shape, and those that are not finite or do not agree.
 
-    A limit may be undefined in some postures. They are left out, provided that they are the minority.
+    A limit may be undefined in some postures. Such postures are left out, provided that they are a minority.
     """
     moments = sample_moments(robot)
     count = len(moments.q)
@@ -281,7 +281,7 @@ def _check_functions(limit: Limit, robot: Robot) -> None:
 
 
 def _reaches(robot: Robot) -> np.ndarray:
-    """Return how far q, qdot, qddot and qdddot may deviate from the middle, (4, n); q at most as far as the others."""
+    """Return how far q, qdot, qddot and qdddot may deviate from the middle, (4, n), at most `_FURTHEST`."""
     low, high = _ranges(robot)
     rate = np.full(robot.n, _FURTHEST)
     speed = 0.5 * np.minimum(robot.limits.velocity, rate)
@@ -289,7 +289,7 @@ def _reaches(robot: Robot) -> np.ndarray:
 
 
 def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ends of the postures to check, (n,) each: inside the ranges; half a turn, or 1 m, for an open end."""
+    """Return the lowest and highest positions to check, (n,) each: inside the ranges, and not far from zero."""
     reach = np.where(robot.revolute, np.pi, 1.0)
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
@@ -353,9 +353,9 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
     Parameters
     ----------
     limit : Limit
-        Its values and partials have the right shapes and are finite.
+        A limit whose values and partials are finite and have the right shapes.
     moments : Moments
-        The moments at which they are compared.
+        The moments at which the derivatives are compared.
     robot : Robot
 
     Raises
@@ -388,7 +388,11 @@ def check_partials(limit: Limit, moments: Moments, robot: Robot) -> None:
             continue
         joint, column = np.argwhere(is_refused.T)[0]
         worst = np.argmax(np.where(is_wrong, off, -1.0)[:, column, joint])
-        by = "" if name == "s" else f" by {name} of joint {robot.joint_names[joint]!r}"
+        by = (
+            ""
+            if name == "s"
+            else f" with respect to {name} of joint {robot.joint_names[joint]!r}"
+        )
         numbers = np.array([stated, fine])[:, worst, column, joint] / reach[joint]
         posture = write_posture(moments, worst)
         raise InputError(

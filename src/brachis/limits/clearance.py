@@ -1,7 +1,7 @@
-"""The distance between each pair of solids must be at least the clearance: one value for every pair.
+"""The distance between each pair of solids must be at least the clearance; the limit has one value for each pair.
 
-A pair that is far apart counts as `_FAR` above the clearance. With the unit vector u between the nearest points w_a and
-w_b,
+The distance of a pair that is far apart counts as `_FAR` above the clearance. With the unit vector u between the
+nearest points w_a and w_b,
 
     dd/dq = u . (J_b(w_b) - J_a(w_a)).
 """
@@ -19,15 +19,15 @@ from brachis.scene.chain import Chain
 from brachis.task import Task
 
 _FAR = 0.1
-"""Distance above the clearance from which on distances are not computed, m."""
+"""Distance above the clearance, m. If the solids of a pair are farther apart, their distance is not computed."""
 _DEVIATION = 2e-4
-"""Distance by which bodies deviate from a joint path when splines follow it, m."""
+"""Distance by which bodies deviate from their places on a joint path when splines follow it, m."""
 _NEARBY = 2.0
-"""Pairs that stay this many times `_FAR` apart in the initial motion are left out."""
+"""Pairs that stay farther apart than this multiple of `_FAR` in the initial motion are left out."""
 _STRIDE = 0.05
-"""Largest distance that solids move between two checks on a step of the lattice, m."""
+"""Maximum distance that solids move between two checks on a step of the lattice, m."""
 _MOST_STRIDES = 16
-"""Largest number of intervals between the checks on a step."""
+"""Maximum number of intervals between the checks on a step."""
 
 
 class Clearance(Limit):
@@ -36,11 +36,11 @@ class Clearance(Limit):
     Parameters
     ----------
     chain : Chain
-        Of the robot.
+        Chain of the robot.
     scene : Scene
-        Its pairs of solids give the values.
+        Scene whose pairs of solids give the values.
     clearance : float
-        m.
+        Minimum distance, m.
     """
 
     kind = "clearance"
@@ -67,7 +67,7 @@ class Clearance(Limit):
         )
 
     def restrict_to(self, q: np.ndarray) -> Clearance | None:
-        """Keep the pairs that come close in postures, (K, n)."""
+        """Return the limit for the pairs that come close in postures, (K, n); None if no pair does."""
         q = q[np.isfinite(q).all(axis=1)]
         within = self._clearance + _NEARBY * _FAR
         close = self._scene.find_close(self._chain.place(q), within)
@@ -85,7 +85,7 @@ class Clearance(Limit):
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell on which straight steps no pair is too close, at checks between which solids move by `_STRIDE`."""
+        """Tell on which straight steps no pair is too close; solids move at most `_STRIDE` between checks."""
         ends = [self._scene.centres(self._chain.place(q)) for q in (first, last)]
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
@@ -123,7 +123,7 @@ class Clearance(Limit):
 
 
 def build_clearance(robot: Robot, task: Task) -> Clearance | None:
-    """Build the limit of a task that avoids collisions; None without pairs of solids."""
+    """Build the clearance limit of a task; None if there are no pairs of solids."""
     if task.collision_mode != "avoid":
         return None
     scene = scene_of(robot, task)

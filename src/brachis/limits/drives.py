@@ -1,13 +1,13 @@
-"""Limits of drives that are not one number for each joint: the total power, and torques that fall with speed.
+"""Limits of drives that are not one number for each joint: the total power, and torque limits that fall with speed.
 
-|sum over the joints of tau qdot| <= P_total, as a ratio in [-1, 1].
+The total power obeys |sum over the joints of tau qdot| <= P_total, written as a ratio in [-1, 1].
 
 The limit |tau| <= T(|qdot|), with T piecewise linear and falling, is the same for driving and braking. Each joint with
-such a curve has two values, as ratios to its torque at rest T_0, with T rounded from below (`RoundedCurve`):
+such a curve has two values, which are ratios to its torque at rest T_0. T is rounded from below (`RoundedCurve`):
 
     (tau - T(qdot)) / T_0 <= 0,        (-tau - T(qdot)) / T_0 <= 0.
 
-The level first part of a curve is the plain torque limit.
+If the first part of a curve is level, it acts as a plain torque limit.
 
 The rounded curve is twice continuously differentiable and nowhere above the given curve. Let m_k be the slopes between
 the points of the curve, and w_k half the width of the rounding of the corner at speed v_k. As an even function of the
@@ -22,8 +22,8 @@ ramp:
 
 Where a curve falls more and more steeply, T lies below it. A corner after which the curve falls less steeply is first
 moved to the left by w_k, along the line that follows it, so that the rounded part ends at the corner itself. The
-rounded part is convex, and neither of its ends is above the curve, which is straight there. So it is nowhere above the
-curve.
+rounded part is convex, and neither of its ends is above the curve, which is straight there. So the rounded curve is
+nowhere above the given curve.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ class RobotLimit(Limit):
     ----------
     robot : Robot
     figure : float
-        Largest magnitude of the figure, in the unit of the row.
+        Maximum magnitude of the figure, in the unit of the row.
     """
 
     longer_time = "relieves"
     subject: str
-    """What the figure belongs to, for labels."""
+    """Name, for labels, of the part of the robot to which the figure belongs."""
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot
@@ -69,13 +69,13 @@ class RobotLimit(Limit):
 
     @classmethod
     def build(cls, robot: Robot, _task: Task) -> Self | None:
-        """Build the limit; None if the robot has none."""
+        """Build the limit; None if the robot has no such limit."""
         figure = getattr(robot.limits, cls.kind)
         return cls(robot, figure) if np.isfinite(figure) else None
 
 
 class TotalPowerLimit(RobotLimit):
-    """The power that all joints together draw from a common supply, or return to it."""
+    """Limit on the power that all joints together draw from a common supply, or return to it."""
 
     kind = "total_power"
     subject = "all joints"
@@ -90,7 +90,7 @@ class TotalPowerLimit(RobotLimit):
 
 
 WIDTH = 0.002
-"""Half the width of a rounded corner, as a fraction of the shorter of the two pieces beside it."""
+"""Half the width of a rounded corner, as a fraction of the shorter of the two pieces next to the corner."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,11 @@ class RoundedCurve:
     Attributes
     ----------
     stall_torque : float
-        Value at velocity 0 if the corner there were not rounded.
+        Value that the curve would have at velocity 0 if the corner there were not rounded.
     corners : (k,) ndarray
         Speeds of the corners, rad/s or m/s.
     widths : (k,) ndarray
-        Half the widths of the rounded corners.
+        Half-widths of the rounded corners.
     bends : (k,) ndarray
         Changes of slope at the corners.
     """
@@ -118,8 +118,8 @@ class RoundedCurve:
     def below(cls, curve: TorqueSpeedCurve) -> RoundedCurve | None:
         """Round a curve; return None for a curve that does not fall.
 
-        Its last slope continues until no torque is left. If the curve begins with a level part, this part is left out,
-        and the next piece is extended to speed 0: the level itself is a plain torque limit.
+        The last slope of the curve continues until the torque is zero. If the curve begins with a level part, this part
+        is left out, and the next piece is extended to speed 0: the level part itself is a plain torque limit.
         """
         speed, torque = np.array(curve).T
         slope = np.diff(torque) / np.diff(speed)
@@ -144,7 +144,7 @@ class RoundedCurve:
         return cls(stall_torque, corners, widths[first:], np.diff(slope, prepend=0.0))
 
     def _distances(self, velocity: np.ndarray) -> np.ndarray:
-        """Return by how much velocities, (K,), and their negatives exceed those of the corners, (2, K, k)."""
+        """Return by how much velocities, (K,), and their negatives exceed the speeds of the corners, (2, K, k)."""
         return np.array([velocity, -velocity])[..., None] - self.corners
 
     def values(self, velocity: np.ndarray) -> np.ndarray:
@@ -163,7 +163,7 @@ class RoundedCurve:
 
 
 class TorqueSpeedLimit(Limit):
-    """Torques in both directions, relative to the joints' curves.
+    """Limits on torques in both directions, relative to the torque-speed curves of the joints.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class TorqueSpeedLimit(Limit):
         return np.repeat([function(*pair) for pair in pairs], 2, axis=0).T
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Compute the torques in excess of the curves at the joints' velocities, over the torques at rest, (K, c)."""
+        """Compute by how much torques exceed the curves at their velocities, divided by the torques at rest, (K, c)."""
         tau = motion.torque(self._robot)[:, self._joints]
         allowed = self._by_curve(RoundedCurve.values, motion)
         excess = self._signs * tau - allowed

@@ -1,8 +1,8 @@
 """Limits on a quantity of each joint: position, velocity, acceleration, jerk, power, torque, torque rate, mean torque.
 
 A value is (quantity - middle) / (half the distance between the lower and the upper limit), in [-1, 1]. If both
-directions have the same limit, this is the ratio to the limit. Positions with a wide or open range are measured in rad
-or m instead.
+directions have the same limit, the value is the ratio of the quantity to the limit. Positions with a wide or open range
+are measured in rad or m instead.
 
 The rate of the torque tau(q, qdot, qddot) is
 
@@ -42,7 +42,7 @@ from brachis.task import LIMIT_KINDS, Task
 
 
 class JointLimit(Limit):
-    """Limits on a quantity of the joints that are limited; `kind` is a row of `LIMIT_KINDS`.
+    """Limits on one quantity of the limited joints; `kind` is a row of `LIMIT_KINDS`.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class JointLimit(Limit):
         self._set_bounds(np.abs(self._ends), -low == high)
 
     def _set_bounds(self, full_scale: np.ndarray, is_symmetric: np.ndarray) -> None:
-        """List the finite limits, with full scales, (2, c); a limit that is symmetric, (c,) bool, is one figure."""
+        """List the finite limits, with full scales, (2, c); a symmetric limit, (c,) bool, counts as one figure."""
         self.bounds = tuple(
             Bound(
                 column,
@@ -151,7 +151,7 @@ class _DerivativeLimit(JointLimit):
 
 
 def position_measure(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Return the distance from a range that is a violation of 1, rad or m: half the range, at least 1e-5, at most 1."""
+    """Return the distance outside a range, rad or m, that counts as a violation of 1: half the range, 1e-5 to 1."""
     return np.clip(0.5 * upper - 0.5 * lower, 1e-5, 1.0)
 
 
@@ -182,7 +182,7 @@ class PositionLimit(_DerivativeLimit):
 
     @property
     def centre(self) -> np.ndarray:
-        """The middles of the ranges."""
+        """Values at the middles of the ranges."""
         return super(JointLimit, self).centre
 
 
@@ -323,11 +323,11 @@ class RmsTorqueLimit(_TorqueLimit):
         return super().partials(motion).map(lambda slopes: factors * slopes)
 
     def violation(self, values: np.ndarray) -> np.ndarray:
-        """Measure the root mean square itself."""
+        """Compute the violations of the root mean square itself, not of its square."""
         return np.sqrt(np.maximum(values, 0.0)) - np.sqrt(self.upper)
 
     def ratio(self, values: np.ndarray) -> np.ndarray:
-        """Measure the root mean square itself."""
+        """Compute the ratios of the root mean square itself, not of its square."""
         return np.sqrt(np.maximum(values, 0.0) / self.upper)
 
 
@@ -344,20 +344,20 @@ JOINT_LIMITS = {
         TorqueRateLimit,
     )
 }
-"""The limit of every row of `LIMIT_KINDS`."""
+"""The class of the limit for every row of `LIMIT_KINDS`."""
 _QUANTITIES: dict[type[Limit], str] = {TorqueLimit: "torque"} | {
     limit: limit.derivative
     for limit in (PositionLimit, VelocityLimit, AccelerationLimit, JerkLimit)
 }
-"""Limits whose values are (a quantity of the kernel - an offset) * a factor."""
+"""Limits whose values have the form (quantity of the kernel - offset) * factor."""
 
 
 def reciprocals_near(
     robot: Robot, limits: Sequence[Limit], q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the reciprocals of the largest acceleration and velocity of each joint alone close to `q`, (n,) each.
+    """Return the reciprocals of the maximum acceleration and velocity of each joint alone, close to `q`, (n,) each.
 
-    They follow from the limits of the joints; 0 for a joint without a limit.
+    They follow from the limits of the joints. For a joint without a limit, the reciprocal is 0.
     """
     reciprocals = np.zeros((2, robot.n))
     for limit in limits:

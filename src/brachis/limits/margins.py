@@ -1,6 +1,7 @@
-"""Margins that a motion keeps on request: a distance from singular postures, and from the ends of joint ranges.
+"""Margins that a task may ask for: a distance from singular postures, and a distance from the ends of joint ranges.
 
-With the singular vectors u and v of the least singular value of the Jacobian J(q), its slope is u^T dJ v.
+If u and v are the singular vectors of the smallest singular value of the Jacobian J(q), the slope of this value is u^T
+dJ v.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from brachis.task import Task
 
 
 class SingularityLimit(Limit):
-    """Ratio of the least singular value of the task Jacobian, for the joints of the arm itself, to the required value.
+    """Ratio of the smallest singular value of the task Jacobian, for the arm's own joints, to the required value.
 
     Parameters
     ----------
     robot : Robot
     task : Task
     figure : float
-        The required value.
+        Required smallest singular value.
     """
 
     kind = "singularity"
@@ -60,13 +61,13 @@ class SingularityLimit(Limit):
 
 
 class JointEndLimit(Limit):
-    """Joint positions relative to their ranges, from 0 to 1, which keep a distance from both ends.
+    """Limit that keeps joint positions away from both ends of their ranges; a range counts from 0 to 1.
 
     Parameters
     ----------
     robot : Robot
     share : float
-        Fraction of each range that is kept free at both ends.
+        Fraction of each range that is kept clear at either end.
     """
 
     kind = "joint_ends"
@@ -92,7 +93,7 @@ class JointEndLimit(Limit):
         self.violation_scale = np.minimum(self._width, 1.0)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
-        """Tell in which postures, (K, n), it holds with angles in the turn closest to the range's middle, (K,) bool."""
+        """Tell in which postures, (K, n), it is met, (K,) bool; angles count in the turn closest to the middle."""
         middle = self._begin + 0.5 * self._width
         turned = q.copy()
         turned[:, self._joints] = in_turn_of(q[:, self._joints], middle, self._revolute)

@@ -1,9 +1,9 @@
-"""What a limit on the motion is: one object, which is used unchanged by the search, the optimiser and the reports.
+"""The interface of a limit on the motion: one object, which the search, the optimiser and the reports use unchanged.
 
 A limit has c values at every moment of the motion, which must stay between `lower` and `upper`. Most values are ratios
-to a figure, with the bounds -1 and 1. The *violation* of a value v says how far it is outside its bounds. Its *ratio*
-says how much of the limit it uses: 1 at the upper bound, -1 at the lower bound. With the `violation_scale` k and the
-`centre` c,
+to a figure, with the bounds -1 and 1. The *violation* of a value v says how far the value is outside its bounds. The
+*ratio* of the value says how much of the limit is used: 1 at the upper bound, -1 at the lower bound. With the
+`violation_scale` k and the `centre` c,
 
     violation = max(k (v - upper), k (lower - v))
     ratio     = (v - c) / (upper - c)         between c and the upper bound; towards the lower bound likewise, to -1
@@ -34,7 +34,7 @@ _Found = TypeVar("_Found")
 _DEVIATION = 3e-5
 """Approximate distance by which splines deviate from a joint path, rad or m."""
 _LARGEST_INSET = 0.1
-"""Largest inset of joint paths in a narrow range, as a violation."""
+"""Maximum inset of joint paths in a narrow range, as a violation."""
 
 
 class Guarantee(Enum):
@@ -45,7 +45,8 @@ class Guarantee(Enum):
         "met at the collocation points of the optimiser, but not verified"
     )
     AS_MEAN = "met as a mean over the whole motion"
-    """The values have to be squares f^2: the optimiser derives their curvature from that (`brachis.optimise.means`)."""
+    """The values have to be squares f^2: the optimiser derives their curvature from this form
+    (`brachis.optimise.means`)."""
 
     @property
     def is_mean(self) -> bool:
@@ -59,9 +60,9 @@ class JointStates(Protocol):
     Attributes
     ----------
     q, qdot, qddot, qdddot : (K, n) ndarray
-        rad or m, and per second.
+        Positions, rad or m, and their derivatives with respect to time in seconds.
     s : (K,) ndarray
-        Path coordinate; NaN without a path, or if it is unknown.
+        Path coordinate; NaN if there is no path, or if the coordinate is unknown.
     """
 
     @property
@@ -75,11 +76,11 @@ class JointStates(Protocol):
     @property
     def s(self) -> np.ndarray: ...
     def torque(self, robot: Robot) -> np.ndarray:
-        """Return the joint torques, (K, n), which are computed once."""
+        """Return the joint torques, (K, n), which are computed only once."""
         ...
 
     def torque_derivatives(self, robot: Robot) -> TorqueDerivatives:
-        """Return the derivatives of `torque`, which are computed once."""
+        """Return the derivatives of `torque`, which are computed only once."""
         ...
 
 
@@ -101,14 +102,14 @@ class Moments(SharedTorques):
 
 
 class Role(Enum):
-    """What a limit belongs to."""
+    """What a limit belongs to: the robot, the process, the surroundings, or the numerical method."""
 
     ROBOT = "robot"
     """A limit of the drives and joints."""
     PROCESS = "process"
-    """A limit of the process, on what the tool does."""
+    """A limit of the process, which restricts the tool."""
     SCENE = "scene"
-    """A limit of the objects around the robot."""
+    """A limit due to the objects around the robot."""
     SAFEGUARD = "safeguard"
     """A numerical limit, not a physical one. Small violations are ignored, and the verification does not check it."""
 
@@ -130,8 +131,8 @@ class Bound:
         Distance by which the bounds of the value move outwards when the figure is relaxed by one unit: 1 / figure for
         a ratio.
     side : {"lower", "upper"} or None
-        The bound that the figure moves. None: it moves both bounds. An infinite bound stays infinite, so None also
-        serves for a ratio that has an upper bound only.
+        The bound that the figure moves; None if it moves both. An infinite bound stays infinite, so None also serves
+        for a ratio that has an upper bound only.
     """
 
     column: int
@@ -143,7 +144,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Partials:
-    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None stands for zeros.
+    """Partial derivatives of a limit's c values at K moments, (K, c, n) each; None means zeros.
 
     `s`, (K, c), is the derivative with respect to the path coordinate, if a value depends on it directly.
     """
@@ -173,10 +174,10 @@ class Partials:
 
 
 class HasLatticeWeights(ABC):
-    """Further base class of limits by which the lattice measures joint steps between postures.
+    """Additional base class of limits by which the lattice measures joint steps between postures.
 
-    It suits limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest, such
-    as torques. Other limits have no effect on the length of a step.
+    It is for limits that are linear in the joint accelerations or in the joint velocities while the arm is at rest,
+    such as torques. Other limits have no effect on the length of a step.
     """
 
     @abstractmethod
@@ -185,39 +186,40 @@ class HasLatticeWeights(ABC):
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Return the rows A and B, (K, c, n), in postures q, (K, n); None for zeros.
 
-        A qddot is the share of the limit that joint accelerations use, B qdot the share that joint velocities use.
+        A qddot is the fraction of the limit that joint accelerations use; B qdot is the fraction that joint velocities
+        use.
         """
 
 
 class Description:
-    """The properties of a limit besides its values.
+    """The properties of a limit apart from its values.
 
     Attributes
     ----------
     kind : str
-        Name of the kind of limit. The names of the built-in kinds are taken.
+        Name of the kind of limit. The names of the built-in kinds are reserved.
     labels : tuple of Label
         A label for each of the c values.
     lower, upper : (c,) ndarray
         Bounds of the values; -inf and inf where there is no bound. The values should be of the order of 1.
     guarantee : Guarantee
-        Where the limit holds.
+        Where the limit is guaranteed to be met.
     role : Role
-        What the limit belongs to.
+        What the limit belongs to; see `Role`.
     longer_time : {"relieves", "neither"}
         Effect of a longer end time on the values. It relieves everything that grows with speed, such as a velocity,
         an acceleration or an energy.
     at_rest : {"nothing", "posture", "turns"}
-        What the limit restricts while the arm rests. "posture": the posture, where an angle and the same angle plus
-        2 pi count alike, for example the torque that holds the arm against gravity. "turns": also the number of turns,
-        for example a range of joint positions.
+        What the limit restricts while the arm rests. "posture": only the posture, so that an angle and the same angle
+        plus 2 pi count alike; an example is the torque that holds the arm against gravity. "turns": also the number of
+        turns; an example is a range of joint positions.
     breaks : (b,) ndarray
         Path coordinates at which the limit changes abruptly, so that the motion must be checked exactly there.
     order : int
         Order of the highest time derivative of q in the values: 2, or 3 for the jerk. The degree of the splines must be
         at least as high.
     violation_scale : (c,) ndarray or float
-        Factor from the distance between a value and the bound that it exceeds to its violation: 1 for ratios.
+        Violation of a value divided by its distance from the bound that it exceeds: 1 for ratios.
     inset : (c,) ndarray or float
         Distance, as a violation, that joint paths keep from the bounds of a limit on postures, because splines deviate
         slightly from joint paths. 0 if the deviation is not known.
@@ -240,7 +242,8 @@ class Description:
     refusal: str = "is exceeded at rest"
 
     origin: str = ""
-    """Where the user gives the limit, for messages. Only set for limits that are not built in; brachis sets it."""
+    """Place where the user gives the limit, for messages. brachis sets it, and only for limits that are not built
+    in."""
 
     @property
     def name(self) -> str:
@@ -249,7 +252,7 @@ class Description:
 
     @property
     def is_checked_at_points(self) -> bool:
-        """Whether a violation at a single point counts."""
+        """Whether a violation at a single point of the motion counts."""
         return self.role is not Role.SAFEGUARD and not self.guarantee.is_mean
 
     @property
@@ -281,7 +284,7 @@ def compute_inset(measure: np.ndarray | float) -> np.ndarray | float:
 
 
 def _name_failures_of(method: Callable[..., _Found]) -> Callable[..., _Found]:
-    """Let a method of a limit name the plug-in that it belongs to, if it fails."""
+    """Wrap a method of a plug-in's limit so that an error in the method names the plug-in."""
 
     @wraps(method)
     def call(limit: Limit, motion: JointStates) -> _Found:
@@ -306,7 +309,7 @@ class Limit(Description, ABC):
     robot: Robot
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Let the methods of a plug-in name the plug-in if they fail."""
+        """Wrap the methods of a plug-in's limit so that errors in them name the plug-in."""
         super().__init_subclass__(**keywords)
         for name in ("values", "partials"):
             if name in vars(cls):
@@ -315,7 +318,7 @@ class Limit(Description, ABC):
     def bind(self, robot: Robot) -> Self:
         """Return the limit for a robot: a copy with the attribute `robot`.
 
-        Override this method to check the robot, or to compute in advance what depends on it.
+        Override this method to check the robot, or to compute values that depend on the robot in advance.
         """
         bound = copy.copy(self)
         object.__setattr__(bound, "robot", robot)  # it may be frozen
@@ -360,7 +363,7 @@ class Limit(Description, ABC):
 
         Examples
         --------
-        The partials of the example of `values`:
+        The partial derivatives for the example of `values`:
 
         >>> def partials(self, motion):
         ...     first = np.eye(self.robot.n)[None, :1] / 2.0
@@ -383,7 +386,7 @@ class Limit(Description, ABC):
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
-        """Tell for each straight step between two postures, (E, n), if the limit holds as at its ends, (E,) bool."""
+        """Tell for each straight step between two postures, (E, n), if the limit is met as at its ends, (E,) bool."""
         return np.ones(len(first), dtype=bool)
 
     def relax(self, bound: Bound, amount: float) -> Self:
@@ -431,7 +434,7 @@ class Limit(Description, ABC):
     def ratios(self, motion: JointStates, t: np.ndarray) -> np.ndarray:
         """Compute the ratios of a whole motion to the bounds, (K, c), at dense, ascending times t, (K,), s.
 
-        The ratio of a mean over the motion is the same at all times.
+        If the limit applies to a mean over the motion, the ratio is the same at all times.
         """
         values = self.values(motion)
         if self.guarantee.is_mean:

@@ -1,4 +1,4 @@
-"""Branch margins >= eps: this keeps the motion on its branch and away from singular decompositions."""
+"""Lower bounds on branch margins, which keep the motion on its branch and away from singular decompositions."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ from brachis.kinematics import JointMap
 from brachis.limits.protocol import Guarantee, JointStates, Limit, Partials, Role
 
 MARGIN = 5e-3
-"""Least branch margin, dimensionless. Closer to the boundary, non-redundant joints move too fast for any collocation
+"""Minimum branch margin, dimensionless. Closer to the boundary, non-redundant joints move too fast for any collocation
 grid."""
 HELD_BACK = 1e-4
 """A branch margin that is closer than this to its bound is considered to hold the motion back."""
 
 
 class BranchMargin(Limit):
-    """Margins of the branch of a joint map.
+    """Limit that keeps a motion clear of the branch boundaries of a joint map.
 
     Parameters
     ----------
     joint_map : JointMap
     at_start : (c,) ndarray
-        Margins of the start posture. If half of one is smaller than `margin`, it is the least margin.
+        Branch margins of the start posture. If half of such a margin is smaller than `margin`, this half is the
+        minimum.
     margin : float
-        Least margin, dimensionless.
+        Minimum margin, dimensionless.
     """
 
     kind = "branch_margin"
@@ -45,7 +46,7 @@ class BranchMargin(Limit):
         self.upper = np.full(count, np.inf)
 
     def values(self, motion: JointStates) -> np.ndarray:
-        """Compute the margins, (K, c); the motion is a state of the joint map."""
+        """Compute the margins, (K, c), of a motion that is a state of the joint map."""
         return self._joint_map.margins(motion)
 
     def kernel_quantity(self, _chain: Chain) -> FormulaQuantity | None:
@@ -60,6 +61,6 @@ class BranchMargin(Limit):
 def build_branch_margins(
     joint_map: JointMap, margin: float = MARGIN
 ) -> tuple[BranchMargin, ...]:
-    """Build the limit of a joint map; empty if the map has no margins."""
+    """Build the limit on the branch margins of a joint map; return () if the map has no margins."""
     at_start = joint_map.start_margins()
     return (BranchMargin(joint_map, at_start, margin),) if len(at_start) else ()

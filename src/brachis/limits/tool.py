@@ -5,14 +5,14 @@ With J the Jacobian of a velocity of the tool, v = J(q) qdot and its direction e
 
     d|v|/dqdot = e . J,        d|v|/dq = e . dv/dq,
 
-and likewise for the magnitude of the acceleration a = J qddot + Jdot qdot. A vector of length zero gets the direction
-zero: it is far from its limit.
+and likewise for the magnitude of the acceleration a = J qddot + Jdot qdot. A vector of length zero is given the
+direction zero, because it is far from its limit.
 
-The largest speed of the tool frame's origin may be a piecewise linear function of the path coordinate (`SpeedProfile`).
+The maximum speed of the tool frame's origin may be a piecewise linear function of the path coordinate (`SpeedProfile`).
 
-Three tolerances are more than ranges of the tool's virtual joints: a cone, a sphere, and a box in the world's axes.
+Three tolerances need more than ranges of the tool's virtual joints: a cone, a sphere, and a box in the world's axes.
 With the angles a (side) and b (lead), the tool's z axis is tilted by arccos(cos a cos b). A displacement d in the axes
-of the path's orientation is R d in the axes of the world, with the rotation R of the end of the chain.
+of the path's orientation is R d in the axes of the world, where R is the rotation of the end of the chain.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from brachis.robot.task_map import Pose
 from brachis.task import SpeedTable, Task
 
 PROCESS_SPEED = "process speed"
-"""Name of the setting from which the largest speed next to a part with a process speed follows."""
+"""Name of the setting that determines the maximum speed next to a part with a process speed."""
 
 
 class ToolRatios(Limit):
@@ -62,17 +62,17 @@ class ToolRatios(Limit):
 
 
 class SpeedProfile:
-    """Largest speeds along the path: piecewise linear, with steps turned into ramps on their faster side.
+    """Maximum speeds along the path: piecewise linear, with steps turned into ramps on their faster side.
 
     Parameters
     ----------
     s : (P,) sequence of float
-        Ascending path coordinates. A coordinate that occurs twice is a step.
+        Ascending path coordinates. A coordinate that occurs twice marks a step.
     speed : (P,) sequence of float
         m/s.
     covers_path : bool, optional
-        Whether the first and the last speed also hold before the first and after the last coordinate. Otherwise there
-        is no limit there.
+        Whether the first speed also applies before the first coordinate, and the last speed after the last coordinate.
+        Otherwise there is no limit there.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class SpeedProfile:
     speeds : (p,) ndarray
         Speeds at these coordinates, m/s. Between the given coordinates they are nowhere above the given speeds.
     largest : float
-        Largest of the given speeds, m/s.
+        Highest of the given speeds, m/s.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class SpeedProfile:
         self.speeds = speeds[bends]
 
     def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest speeds at s, (K,), m/s, and their slopes over s, m/s; infinite speeds without a limit."""
+        """Return the maximum speeds at s, (K,), m/s, and their slopes over s, m/s; infinite where there is no limit."""
         if len(self.places) == 1:
             return np.full(len(s), self.speeds[0]), np.zeros(len(s))
         slopes = np.diff(self.speeds) / np.diff(self.places)
@@ -127,9 +127,9 @@ class SpeedProfile:
 
 
 class ToolMotionLimit(ToolRatios):
-    """Ratio of a speed of the tool to its limits: speed or acceleration of its frame's origin, or angular speed.
+    """Ratio of a tool quantity to its limits: speed or acceleration of the frame's origin, or angular speed.
 
-    Virtual joints do not move the tool: their positions are its deviation from the path.
+    Virtual joints do not move the tool: their positions are the deviation of the tool from the path.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class ToolMotionLimit(ToolRatios):
         tables: Sequence[SpeedProfile],
         labels: Sequence[Label],
     ) -> None:
-        # The largest figure of a table represents the table.
+        # Each table is represented by its largest figure.
         super().__init__(labels, [table.largest for table in tables])
         self.kind = f"tool_{quantity}".replace(" ", "_")
         self._robot = robot
@@ -193,7 +193,7 @@ def _label(quantity: str, unit: str) -> Label:
 
 
 def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
-    """Build the limit from the task's tool speed, feed rates, and leads of process speeds; None without any."""
+    """Build the limit from the task's tool speed, feed rates, and leads of process speeds; None if none is given."""
     limits = task.tool_limits
     speed = limits.speed
     tables = []
@@ -207,7 +207,7 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
         labels.append(_label("speed", "m/s"))
     leads = [lead for section in limits.process_speed for lead in section.leads]
     beside = (
-        "before or behind a part with a process speed, the tool is at its largest speed"
+        "before or after a part with a process speed, the tool is at its maximum speed"
     )
     for quantity, key, cause, tables_of_speed, text in (
         ("feed rate", "feed", "feed rate", limits.feed, ""),
@@ -240,13 +240,13 @@ def build_tool_speed(robot: Robot, task: Task) -> ToolMotionLimit | None:
 def constant_limit(
     quantity: str, unit: str, robot: Robot, _task: Task, figure: float
 ) -> ToolMotionLimit:
-    """Return the limit of a quantity of `ToolMotionLimit` with one figure, in the given unit."""
+    """Return the `ToolMotionLimit` of a quantity that is the same all along the path, in the given unit."""
     table = SpeedProfile([0.0], [figure])
     return ToolMotionLimit(robot, quantity, [table], [_label(quantity, unit)])
 
 
 def _joints_of(robot: Robot, *directions: str) -> list[int]:
-    """Return the indices of the tool's virtual joints for some directions, as far as there are such joints."""
+    """Return the indices of the tool's virtual joints for some directions, if the robot has such joints."""
     names = [joint.direction for joint in robot.tool_joints]
     first = len(robot.urdf_joints)
     return [
@@ -255,13 +255,13 @@ def _joints_of(robot: Robot, *directions: str) -> list[int]:
 
 
 class _Size(ToolRatios):
-    """Ratio of the tool's deviation from the path, zero or more, to the largest allowed deviation.
+    """Ratio of the tool's deviation from the path, zero or more, to the maximum deviation.
 
     Parameters
     ----------
     robot : Robot
     figure : float
-        The largest allowed deviation, in the unit of the label.
+        The maximum deviation, in the unit of the label.
     """
 
     at_rest = "posture"
@@ -287,7 +287,7 @@ class _Size(ToolRatios):
 
 
 class TiltLimit(_Size):
-    """Ratio of the angle between the z axes of the tool and the path to the largest angle."""
+    """Ratio of the angle between the z axes of the tool and the path to the maximum angle."""
 
     kind = "tool_tilt"
     directions = ("side", "lead")
@@ -307,7 +307,7 @@ class TiltLimit(_Size):
 
 
 class DistanceLimit(_Size):
-    """Ratio of the distance between tool and path to the largest distance."""
+    """Ratio of the distance between tool and path to the maximum distance."""
 
     kind = "tool_distance"
     directions = ("x", "y", "z")
@@ -371,7 +371,7 @@ class RangeLimit(Limit):
 
 
 def build_tool_range(robot: Robot, task: Task) -> RangeLimit | None:
-    """Build the limit; None unless the task allows the tool a box in the world's axes."""
+    """Build the limit; None unless the task gives the tool a tolerance box in the world's axes."""
     tolerance = task.tolerances.position
     if tolerance.axes == "tool" or tolerance.x is None:
         return None

@@ -1,4 +1,4 @@
-"""Checks that refuse postures and task spaces at once, such as a posture that is out of range or too heavy to hold."""
+"""Checks of postures and task spaces before planning: a posture may be out of range, or too heavy to hold."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from brachis.robot.task_map.protocol import TURN_ROWS
 from brachis.task import SplineSettings, Task
 
 _REGULAR = 1e-6
-"""Least singular value of the Jacobian, in m and rad, below which a posture counts as a singularity of the arm."""
+"""If the smallest singular value of the Jacobian, in m and rad, is below this, the posture counts as singular."""
 
 
 _MOVE_BODIES = (
@@ -47,13 +47,14 @@ def check_postures(
     task_map : TaskMap
     limits : tuple of Limit
     postures : mapping of str to (n,) ndarray
-        The given postures among ``start`` and ``end``.
+        The postures that the task gives, by the names ``start`` and ``end``.
     path : Path
 
     Returns
     -------
     tuple of Limit
-        The limits, widened where such a posture, or a path of joints, exceeds them by up to ``refinement.tolerance``.
+        The limits. A limit that a given posture or a prescribed joint path exceeds by up to ``refinement.tolerance`` is
+        widened to include it.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:
 def _check_range(
     robot: Robot, postures: np.ndarray, where: str, tolerance: float
 ) -> None:
-    """Refuse a posture, or a path of joints, (K, n), that leaves a joint's range."""
+    """Refuse a posture, or a prescribed joint path, (K, n), that leaves a joint's range."""
     lower = robot.limits.position_lower
     upper = robot.limits.position_upper
     excess = np.maximum(lower - postures, postures - upper)
@@ -141,7 +142,7 @@ def _check_range(
 def beyond_at_rest(
     limit: Limit, q: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values, (K, c), of a limit in postures (K, n) at rest, and their violation less the tolerance."""
+    """Return a limit's values, (K, c), in postures (K, n) at rest, and their violations minus the tolerance."""
     values = limit.values(Moments.at_rest(q))
     return values, limit.violation(values) - tolerance
 
@@ -153,7 +154,7 @@ def _check_at_rest(
     where: str,
     tolerance: float,
 ) -> None:
-    """Refuse a posture in which a limit is exceeded although the arm stands still."""
+    """Refuse a posture in which a limit is exceeded even though the arm stands still."""
     for limit in limits:
         if limit.at_rest == "nothing":
             continue
@@ -169,7 +170,7 @@ def _check_at_rest(
         further_subjects = name_first(subjects, ", ")
         likewise = ""
         if further_subjects:
-            # With several joints, changing the limit of one of them is not enough.
+            # If several joints exceed their limits, changing the limit of one joint is not enough.
             likewise = f"; likewise {further_subjects}"
             remedies = [remedy for remedy in remedies if remedy.key != label.key]
         hint = "Choose another posture"
@@ -190,9 +191,9 @@ def _check_at_rest(
 def load_remedies(
     robot: Robot, limit: Limit, column: int, ratio: float
 ) -> list[Remedy]:
-    """List remedies if holding the arm takes `ratio` times a limit: a larger limit, or a smaller payload.
+    """List remedies if holding the arm needs `ratio` times a limit: a higher limit, or a smaller payload.
 
-    The payload does not affect limits on postures.
+    A smaller payload is no remedy for a limit that depends on the posture alone.
     """
     label = limit.labels[column]
     scale = getattr(robot.settings.limits.scale, limit.kind, 1.0)
@@ -200,7 +201,7 @@ def load_remedies(
     for bound in limit.bounds if label.key else ():
         if bound.column == column and bound.side is None:
             figure = bound.figure / scale
-            # The new limit is 5 % more than what is needed to hold the arm.
+            # The new limit is 5 % above the value needed to hold the arm.
             enough = 1.05 * ratio * figure
             remedies.append(Remedy(label.key, figure, enough, label.unit))
     payload = robot.settings.payload
@@ -211,7 +212,7 @@ def load_remedies(
 
 
 def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
-    """Refuse limits on a derivative that is unbounded because the derivative before it jumps, at knots or at the ends.
+    """Refuse limits on a derivative that is unbounded because the next lower derivative jumps at knots or at the ends.
 
     Raises
     ------
@@ -237,7 +238,7 @@ def check_smoothness(limits: Sequence[Limit], spline: SplineSettings) -> None:
 
 
 def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
-    """Write a value and its bounds in the unit of the value's label, without the unit itself."""
+    """Write a value and its bounds in the unit of the value's label, without naming the unit."""
     bounds = [bound for bound in limit.bounds if bound.column == column]
     if not bounds:
         written, low, high = write_apart(
@@ -261,7 +262,7 @@ def in_figures(limit: Limit, column: int, value: float) -> tuple[str, str]:
 def check_regular(
     task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> None:
-    """Refuse a start or end posture that is a singularity of the arm, because no coordinates describe motions from it.
+    """Refuse a start or end posture that is a singularity of the arm, because no coordinates describe motions there.
 
     Raises
     ------
@@ -280,8 +281,8 @@ def check_regular(
 
 
 _TURNS_ALONE = (
-    "rx, ry and rz are turns of the tool about x, y and z; if it turns about only one of these axes, prescribe rows of "
-    "its position, and yaw, pitch or roll"
+    "rx, ry and rz are rotations of the tool about x, y, z; if it turns about only one of these axes, prescribe "
+    "rows of its position, and yaw, pitch or roll"
 )
 
 
@@ -328,17 +329,17 @@ def check_independent(task_map: TaskMap) -> None:
 
 
 def _least_singular_values(jacobians: np.ndarray) -> np.ndarray:
-    """Return the least singular values, (K,), of Jacobians, (K, m, n)."""
+    """Return the smallest singular values, (K,), of Jacobians, (K, m, n)."""
     return np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, -1])
 
 
 def branch_of(task_map: TaskMap, match: Match, posture: np.ndarray, key: str) -> int:
-    """Return the index of the closed form's branch that contains a start or end posture, stated at `key`.
+    """Return the index of the closed form's branch that contains a start or end posture; `key` is its task key.
 
     Raises
     ------
     StartError
-        Branches meet in the posture.
+        Branches of the closed form meet at the posture.
     """
     robot = task_map.robot
     solver = match.solver

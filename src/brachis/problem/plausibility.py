@@ -1,6 +1,6 @@
-"""Checks for implausible figures of a task or a robot: an unusually large figure looks like a different unit.
+"""Checks for implausible figures in a task or a robot: an unusually large figure may be in the wrong unit.
 
-`USUAL` is the table of the largest usual figures; those of joint limits are in `brachis.task.LIMIT_KINDS`.
+`USUAL` lists the largest usual figures; the figures for joint limits are in `brachis.task.LIMIT_KINDS`.
 """
 
 from __future__ import annotations
@@ -61,34 +61,34 @@ USUAL = {
     "path_start": ("the angle looks like degrees", TURN, "rad", ""),
     "path": ("the turn of the angle looks like degrees", 2.0 * TURN, "rad", ""),
     "path.dwell": ("the time looks like ms", 100.0, "s", ""),
-    "link": ("the distance from the joint before looks like mm", 20.0, "m", ""),
-    # This is multiplied by the arm's length.
+    "link": ("the distance from the previous joint looks like mm", 20.0, "m", ""),
+    # This figure is multiplied by the arm's length.
     "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
     "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
     "scene": ("the length looks like mm", 30.0, "m", ""),
     "collisions": ("the length looks like mm", 0.5, "m", ""),
     "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
-    # The strongest arms of 1 m reach carry 130 kg, and more with the square of the reach.
+    # The strongest arms with a reach of 1 m carry 130 kg; the payload grows with the square of the reach.
     "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
-    # This is multiplied by the arm's length.
+    # This figure is multiplied by the arm's length.
     "robot.payload.com": (
         "the distance from the tool frame looks like mm",
         1.0,
         "m",
         _OF_SIZE,
     ),
-    # This is multiplied by the mass and the square of the length.
+    # This figure is multiplied by the mass and by the square of the arm's length.
     "robot.payload.inertia": (
         "the inertia looks like kg mm^2",
         1.0,
         "kg m^2",
         _OF_MASS,
     ),
-    # A body of the heaviest arms weighs 150 kg for each square metre of their reach.
+    # In the heaviest arms, one body weighs 150 kg times the square of the reach in metres.
     "body mass": ("the mass looks like g", 1e3, "kg", _OF_SIZE),
-    # This is multiplied by the mass: bodies 10 m wide.
+    # This figure is multiplied by the mass; it is that of bodies 10 m wide.
     "body inertia": ("the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS),
-    # The moment of a gram at 10 cm: smaller ones do not show in torques.
+    # This is the moment of inertia of 1 g at 10 cm; smaller moments hardly change the torques.
     "massless inertia": (
         "moments of inertia without mass are left out",
         1e-5,
@@ -96,7 +96,7 @@ USUAL = {
         ", or a mass > 0 kg",
     ),
 }
-"""For each key of the task or part of the robot: what a larger figure looks like, the largest usual figure, its unit,
+"""For each key of the task or part of the robot: the warning about a larger figure, the largest usual figure, its unit,
 and a remark on it. Some of the largest figures are relative to the size or the mass of the robot.
 """
 
@@ -110,19 +110,19 @@ def _figure(
 
 
 def of_task(task: Task) -> tuple[Issue, ...]:
-    """Check limits of the tool, bodies, angles, and points that the path was fitted to."""
+    """Check a task's tool limits, bodies and angles, and the points that its path was fitted to."""
     return (*_tool(task), *_bodies(task), *_angles(task), *_fits(task))
 
 
 def _fits(task: Task) -> Iterator[Issue]:
-    """Check the points that the path was fitted to, and the allowed distance from them."""
+    """Check the points that the path was fitted to, and the permitted distance of the path from them."""
     for fit in task.fits:
         where = f"path: {fit.source}"
         if fit.doubt:
             usual = "a path within the robot's reach"
             yield Issue(where, fit.doubt, f"{fit.length:.4g} m", usual)
         tolerance = fit.position_tolerance
-        # The coarsest scans scatter by some mm.
+        # Even the coarsest scans scatter by only a few mm.
         yield from issue_above(
             f"{where}: tolerance.position",
             "the tolerance looks like mm",
@@ -134,7 +134,7 @@ def _fits(task: Task) -> Iterator[Issue]:
 
 
 def _bodies(task: Task) -> Iterator[Issue]:
-    """Compare the sizes and positions of a scene's bodies, and the clearances around them, with a large cell."""
+    """Compare the sizes and positions of a scene's bodies, and the clearances around them, with a large robot cell."""
     for body in task.scene:
         largest = max(body.size, *map(abs, body.position))
         yield from _figure("scene", largest, where=f"scene: {body.name}")
@@ -166,7 +166,8 @@ def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]
     """Check the largest angle of every joint in postures, (n,) or (K, n)."""
     limits = robot.limits
     is_ranged = np.isfinite(limits.position_lower) & np.isfinite(limits.position_upper)
-    # A joint without a range may have made five turns. In a posture in degrees, at least one joint exceeds this.
+    # A joint without a range may have made five turns. If a posture is in degrees, at least one joint exceeds this
+    # figure.
     farthest = np.abs(postures[..., robot.revolute]).max(initial=0.0)
     turns = 1.0 if farthest > 5.0 * TURN + 1e-3 else 5.0
     for i in np.flatnonzero(robot.revolute):
@@ -190,7 +191,7 @@ def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
 
 
 def _tool(task: Task) -> Iterator[Issue]:
-    """Check the largest limit of every kind, and dwells; feed rates are left out, because they have their own units."""
+    """Check the highest tool limit of each kind, and dwells; feed rates are left out, as they have their own units."""
     limits = task.tool_limits
     speed = limits.speed
     values = {
@@ -219,9 +220,10 @@ def _largest(values: Iterable[float | None]) -> float:
 
 
 def _angles(task: Task) -> Iterator[Issue]:
-    """Look for angles in rad where degrees belong: multiples of an eighth of a turn, up to two turns.
+    """Find angles that are in rad but should be in degrees: multiples of an eighth of a turn, up to two turns.
 
-    They have to agree in two decimals: 3.14 is half a turn, but 5.5 is not seven eighths of a turn.
+    An angle has to agree with such a multiple to two decimals: 3.14 is half a turn, but 5.5 is not seven eighths of a
+    turn.
     """
     content = task.model_dump(
         include={
@@ -241,7 +243,7 @@ def _angles(task: Task) -> Iterator[Issue]:
 
 
 def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
-    """Yield all numbers below keys that end in ``_deg``, with their dotted keys."""
+    """Yield all numbers under keys that end in ``_deg``, with their dotted keys."""
     if isinstance(content, Mapping):
         for name, value in content.items():
             yield from _in_degrees(f"{key}.{name}" if key else name, value)
@@ -269,7 +271,7 @@ def of_robot(robot: Robot) -> tuple[Issue, ...]:
 
 
 def _scales(robot: Robot) -> Iterator[Issue]:
-    message = "the factor raises limits far beyond what was stated"
+    message = "the factor raises limits far above the stated values"
     usual = "0.1 to 1; a percentage is divided by 100"
     for kind, factor in robot.settings.limits.scale.model_dump().items():
         if factor > 10.0:
@@ -278,7 +280,7 @@ def _scales(robot: Robot) -> Iterator[Issue]:
 
 def _friction(robot: Robot) -> Iterator[Issue]:
     """Check the damping in the URDF, which often serves only to stabilise a simulation."""
-    message = "the damping of the URDF takes more than the largest torque at the largest speed"
+    message = "the damping in the URDF needs more than the maximum torque at the maximum speed"
     for i, damping in enumerate(robot.urdf_dynamics.friction["viscous"]):
         fastest = robot.limits.velocity[i]
         torque = robot.limits.torque[i]
@@ -337,7 +339,7 @@ def _masses(robot: Robot) -> Iterator[Issue]:
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
-    """Say how far the tool has moved at a path coordinate; empty at the start, and for a path of joints."""
+    """Say how far the tool has moved at a path coordinate; say nothing at the start or for a prescribed joint path."""
     if not task_map.axes or s == 0.0:
         return ""
     places = path.sample(np.append(np.linspace(0.0, s, 201), np.linspace(s, 1.0, 201)))
@@ -347,7 +349,7 @@ def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
 
 
 def check_within_reach(problem: Problem) -> None:
-    """Refuse a path of the tool that is farther away than the arm's links and slides together can reach.
+    """Refuse a tool path that is farther away than the arm's links and slides together can reach.
 
     Raises
     ------
@@ -355,7 +357,7 @@ def check_within_reach(problem: Problem) -> None:
     """
     task_map = problem.task_map
     path = problem.path
-    if not task_map.axes:  # a path of joints
+    if not task_map.axes:  # a prescribed joint path
         return
     s = np.linspace(0.0, 1.0, 401)
     robot = task_map.robot
@@ -378,7 +380,7 @@ def check_within_reach(problem: Problem) -> None:
 
 
 def _magnitudes(robot: Robot) -> Iterator[Issue]:
-    """Check the limits around zero of a robot without payload."""
+    """Check the limits that are magnitudes, not ranges, of a robot without payload."""
     for kind, row in LIMIT_KINDS.items():
         usual = row.usual
         if usual is None:
@@ -392,7 +394,7 @@ def _magnitudes(robot: Robot) -> Iterator[Issue]:
             if has_curve or not 0.0 < value < math.inf:
                 continue
             largest = _largest_usual(robot, usual, i)
-            # A power of ten stands for "no limit"; for torques, only one that cannot be a figure in mNm.
+            # A power of ten stands for "no limit"; for torques, only a power that cannot be a torque in mNm.
             is_placeholder = round(math.log10(value), 9).is_integer()
             if usual.compares_weight:
                 is_stated = value == _stated(robot, usual, i)
@@ -425,14 +427,14 @@ def _largest_usual(robot: Robot, usual: UsualLimit, joint: int) -> float:
         # Arms hold a tenth to five times their own weight at full reach.
         candidates.append(50.0 * holding)
     stated = _stated(robot, usual, joint)
-    # URDFs state 1 for an unknown limit.
+    # URDFs often state 1 for an unknown limit.
     if stated and stated != 1.0:
         candidates.append(max(usual.urdf_factor * stated, usual.urdf_least))
     return float(min(candidates))
 
 
 def _ranges(robot: Robot) -> Iterator[Issue]:
-    """Check position ranges: joints with cables make a dozen turns at most."""
+    """Check position ranges: joints with cables can make a dozen turns at most."""
     limits = robot.limits
     columns = zip(
         robot.joint_names,
@@ -443,13 +445,13 @@ def _ranges(robot: Robot) -> Iterator[Issue]:
         strict=True,
     )
     for name, unit, lower, upper, known in columns:
-        # In degrees, few ranges are narrower than 120; few rails are longer than 30 m.
+        # Few ranges are narrower than 120 degrees, and few rails are longer than 30 m.
         usual = 120.0 if unit == "rad" else 50.0
         stated = (known.upper or 0.0) - (known.lower or 0.0)
         if stated > 0.0:
             least = 4.0 * math.pi if unit == "rad" else 5.0
             usual = min(usual, max(5.0 * stated, least))
-        # A larger figure stands for "no limit": in degrees, ranges end at 720.
+        # A larger figure stands for "no limit": ranges in degrees end at 720 at most.
         if max(abs(lower), abs(upper)) <= (800.0 if unit == "rad" else 1e5):
             yield from issue_above(
                 f"robot.limits.position.{name}",
@@ -467,10 +469,10 @@ def _curves(robot: Robot) -> Iterator[Issue]:
     scale = robot.settings.limits.scale.torque
     usual_torque = LIMIT_KINDS["torque"].usual
     assert usual_torque is not None
-    # Without load, motors turn at up to twice the rated speed; a figure in rpm is 9.5 times that in rad/s.
+    # Without load, motors turn at up to twice the rated speed; a speed in rpm is 9.5 times the same speed in rad/s.
     rpm = {"rad": "rpm", "m": "mm per second"}
     usual_speed = UsualLimit(rpm, FASTEST, "velocity", 5.0, 5.0)
-    behind_gear = "; at the joint, behind its gear"
+    behind_gear = "; at the joint, after its gear"
     for i, curve in enumerate(robot.limits.torque_speed):
         if not curve:
             continue

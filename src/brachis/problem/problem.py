@@ -48,15 +48,16 @@ class Problem(Summary):
     ----------
     task : Task
     robot : Robot
-        The robot, with a virtual roll joint if the tool may roll.
+        The robot, with a virtual joint for each direction in which the tool may deviate from the path.
     task_map : TaskMap
     path : Path
     start, end : (n,) ndarray or None
-        Postures at the ends; None if free. They are the same if the motion is periodic. Otherwise the end is the
-        posture on the path that is closest to the given one, which may miss the path by the rounding of its digits.
+        Postures at the ends of the path; None for an end that is free. Both are the same if the motion is periodic.
+        Otherwise `end` is the posture on the path closest to the given one, which may be off the path by a rounding
+        error.
     limits : tuple of Limit
     legs : tuple of Leg
-        Parts of the path that are travelled in one go.
+        Parts of the path that are travelled without a break.
     time_laws : tuple of TimeLaw or None
         Time law of each leg; None if its speed is free.
     own_limits : tuple of LimitModel
@@ -78,7 +79,7 @@ class Problem(Summary):
     def of(
         cls, robot: Robot, task: Task, own_limits: Sequence[LimitModel] = ()
     ) -> Problem:
-        """Bind robot and task, and check the postures that the task gives.
+        """Bind a task to a robot, and check the postures that the task gives.
 
         Parameters
         ----------
@@ -128,7 +129,7 @@ class Problem(Summary):
 
     @property
     def given_postures(self) -> dict[str, np.ndarray]:
-        """Postures of ``start`` and ``end``, without those that are free."""
+        """Given postures, by the names ``start`` and ``end``; an end that is free is left out."""
         both = {"start": self.start, "end": self.end}
         return {name: posture for name, posture in both.items() if posture is not None}
 
@@ -156,7 +157,7 @@ class Problem(Summary):
 
     @property
     def dwell_time(self) -> float:
-        """Time for which the tool stands still between legs, s."""
+        """Total time for which the tool stands still between legs, s."""
         return sum(leg.dwell for leg in self.legs)
 
     @property
@@ -170,7 +171,7 @@ class Problem(Summary):
         return 0.0 if law is None else float(law.ends[end, 1])
 
     def _rate_between(self, before: int, after: int) -> float:
-        """Return ds/dt where a leg ends and another one begins, 1/s."""
+        """Return ds/dt where one leg ends and another begins, 1/s."""
         if self.legs[before].stops:
             return 0.0
         return self._law_rate(before, -1) or self._law_rate(after, 0)
@@ -191,7 +192,7 @@ class Problem(Summary):
 
 
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture at the end of the path closest to a given one, (n,), which may already be there."""
+    """Return the posture, (n,), at the end of the path that is closest to a given one, which may already be there."""
     place = path.sample(np.ones(1)).target
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
@@ -213,7 +214,7 @@ class Decomposition(Summary):
     redundant : tuple of int
         Indices of the redundant joints, ascending.
     branches : tuple of int
-        Indices into ``match.solver.branches``; only one if the start or end posture is given.
+        Indices into ``match.solver.branches``; there is only one if the start or end posture is given.
     """
 
     problem: Problem
@@ -228,7 +229,7 @@ class Decomposition(Summary):
 
     @property
     def clearance(self) -> float:
-        """Least branch margin of the start posture, or of the end posture if the start is free; zero if both are."""
+        """Smallest branch margin of the start posture, or of the end posture if the start is free; zero if both are."""
         posture = self.problem.end if self.problem.start is None else self.problem.start
         if posture is None:
             return 0.0
@@ -274,30 +275,30 @@ class Decompositions(Sequence[Decomposition]):
 def decompositions_of(
     problem: Problem, families: Sequence[ik.Family] = ()
 ) -> list[Decomposition]:
-    """List the decompositions that the task allows.
+    """List the decompositions, which are choices of redundant joints, that the task allows.
 
     Parameters
     ----------
     problem : Problem
     families : sequence of Family, optional
-        Closed forms to try before the built-in ones.
+        Families of closed-form inverse kinematics to try before the built-in ones.
 
     Returns
     -------
     list of Decomposition
         With ``redundant_joints: auto``, the decomposition with the largest branch margin at the start posture comes
-        first. The list is empty if the robot has no closed form, or if the path is one of joints. If the task names the
-        joints, it has at least one item.
+        first. The list is empty if the robot has no closed form, or if the path is a prescribed joint path. If the task
+        names the redundant joints, the list has at least one item.
 
     Raises
     ------
     DecompositionError
         No closed form fits the robot and the task.
     StartError
-        A given posture is singular. Or a branch or named joints bind the motion to one branch, and a given posture is
-        on another.
+        A given posture is singular, or it is not on the branch to which the task's branch or redundant joints restrict
+        the motion.
     UnknownNameError
-        The robot has no such joint, or the closed form no such branch.
+        The robot has no joint, or the closed form has no branch, with the name that the task gives.
     """
     task = problem.task
     robot = problem.robot
@@ -314,7 +315,7 @@ def decompositions_of(
     is_bound = task.branch != "auto" or task.search.guesses != "lattice"
     if not matches and (is_bound or robot.n < task_map.m):
         if len(tried) <= 1:
-            # There is nothing to choose: report the reasons for the only choice, or the wrong number of joints.
+            # There is nothing to choose: report why the only choice fails, or that the number of joints is wrong.
             ik.find(robot, task_map, (), families=families)
         raise DecompositionError(
             "no choice of redundant joints has a closed form",
@@ -339,7 +340,7 @@ def decompositions_of(
 
 
 def _with_tool_joints(task_map: TaskMap, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Add the virtual joints of the tool if these are the redundant joints that `names` leaves out."""
+    """Add the virtual joints of the tool if exactly these are missing from the redundant joints in `names`."""
     robot = task_map.robot
     virtual = [joint.name for joint in robot.tool_joints if joint.name not in names]
     is_short = robot.n - task_map.m - len(names) == len(virtual)
@@ -365,7 +366,7 @@ def _decomposition(problem: Problem, match: ik.Match) -> Decomposition:
             origin = "start posture" if stated_branch == "auto" else "task's branch"
             leave_out = "end" if stated_branch == "auto" else "branch"
             raise StartError(
-                f"the {name} posture is on another branch than the {origin}",
+                f"the {name} posture is on a different branch from the {origin}",
                 where=key,
                 found=labels[branch],
                 allowed=labels[branches[0]],

@@ -21,7 +21,7 @@ def chain_of(
     tool_frame : int
         Index of the tool frame.
     friction : (n, 4) ndarray, optional
-        See `Chain`; zeros if left out.
+        Friction terms (see `Chain`); zeros if left out.
     """
     data = model.createData()
     zero = np.zeros(model.nq)

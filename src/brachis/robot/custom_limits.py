@@ -1,8 +1,8 @@
-"""Limits that are not built in: those of a user's program, and those of other packages.
+"""Limits that are not built in: limits from a user's program, and limits from other packages.
 
-A task names the kinds of other packages under ``custom_limits``. They are entry points of the group ``brachis.limits``.
-Each entry point is a callable that takes the parameters of the task as keywords, and returns an object whose
-``bind(robot)`` returns the limit for a robot (see `brachis.limits.Limit`).
+A task names kinds of limits from other packages under ``custom_limits``. These kinds are entry points of the group
+``brachis.limits``. Each entry point is a callable that takes the parameters of the task as keywords, and returns an
+object whose ``bind(robot)`` returns the limit for a robot (see `brachis.limits.Limit`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SECTION = "custom_limits"
 
 
 class LimitModel(Protocol):
-    """A limit as a user gives it, before the robot is known."""
+    """A limit as a user gives it, not yet bound to a robot."""
 
     def bind(self, robot: Robot, /) -> Any:
         """Return the limit for a robot, a `brachis.limits.Limit`."""
@@ -32,7 +32,7 @@ class LimitModel(Protocol):
 def list_models(
     task: Task, own_limits: Sequence[LimitModel] = ()
 ) -> dict[str, LimitModel]:
-    """List the limits of a task's ``custom_limits`` and of a program by their places, such as ``own_limits[0]``.
+    """List the limits of a task's ``custom_limits`` and of a program; keys are their places, such as ``own_limits[0]``.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def check_ratios(
     Raises
     ------
     InputError
-        The result of the method is not finite, or has a different shape.
+        The result of the method is not finite, or has the wrong shape.
     """
     with name_failures(where, "check"):
         ratios = model.check(robot, *motion)

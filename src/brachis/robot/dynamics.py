@@ -31,7 +31,7 @@ class SharedTorques:
         return {}
 
     def _compute_once(self, function: Callable[..., Any]) -> Any:
-        """Return the value of a function of position, velocity and acceleration for this motion."""
+        """Return a function's value for the positions, velocities and accelerations of this motion."""
         if function not in self._known:
             self._known[function] = function(self.q, self.qdot, self.qddot)
         return self._known[function]

@@ -21,9 +21,9 @@ class Friction(Summary):
     """Armature, viscous friction and Coulomb friction of every joint. The arrays are read-only.
 
     The joint torque is ``rnea(q, qdot, qddot) + armature * qddot + viscous * qdot + coulomb * tanh(qdot / v_eps)``.
-    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps it at zero and adds the term here. Pinocchio reads
-    ``damping`` and ``friction`` from a URDF, but its ``rnea`` does not use them. Here they are the viscous and the
-    Coulomb term, unless the task gives other values.
+    Pinocchio's ``rnea`` would add ``model.armature``; brachis keeps this attribute at zero and adds the term here.
+    Pinocchio reads ``damping`` and ``friction`` from a URDF, but its ``rnea`` does not use them. Here they are the
+    viscous and the Coulomb term, unless the task gives other values.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Friction(Summary):
         urdf: Mapping[str, np.ndarray],
         settings: FrictionSettings,
     ) -> Friction:
-        """Combine the values of a task with those of the URDF, for the joints of a chain.
+        """Combine the friction in a task with that in the URDF, for the joints of a chain.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class Friction(Summary):
         return cls(**terms, v_eps=v_eps)
 
     def check_against(self, model: pin.Model, limits: np.ndarray) -> None:
-        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome: a joint could only creep.
+        """Refuse Coulomb friction that the torque limits, (n,), cannot overcome, because the joint could only creep.
 
         Raises
         ------
@@ -132,7 +132,7 @@ class Friction(Summary):
             if i > 0:
                 joint = model.frames[model.getFrameId(names[i], pin.FrameType.JOINT)]
                 carrier = model.frames[joint.parentFrame].name
-                hint += f". To leave the joint out, end the chain at {carrier} by robot.tool_frame or --tool-frame"
+                hint += f". To leave the joint out, end the chain at {carrier} with robot.tool_frame or --tool-frame"
             raise InputError(
                 f"the Coulomb friction of joint {names[i]!r} is not below its torque limit",
                 where="robot.friction.coulomb",

@@ -1,4 +1,4 @@
-"""The robot that a task describes, alone or together with a given robot; and a description of what acts on it."""
+"""The robot that a task describes, alone or together with a given robot; and a description of its settings in words."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def robot_from_settings(
     Parameters
     ----------
     settings : RobotSettings
-        The task's ``robot`` part.
+        The task's ``robot`` section.
     urdf : path, optional
         URDF file to use in place of the URDF that the task names.
     urdf_text : str, optional
-        Text of the URDF, if it was saved with the task. Then nothing is read from disk.
+        Text of the URDF, if it was saved with the task. In this case, nothing is read from disk.
 
     Raises
     ------
@@ -89,7 +89,7 @@ _PER_JOINT: dict[str, object] = {
         for kind, field in FrictionSettings.model_fields.items()
     },
 }
-"""Settings that may be one value, a list or a mapping by joint, with the value of joints that a mapping leaves out."""
+"""Settings that may be one value, a list or a mapping by joint, with the value for joints that a mapping leaves out."""
 
 
 def robot_for(
@@ -100,10 +100,10 @@ def robot_for(
     Parameters
     ----------
     robot : path, Robot or None
-        URDF file or robot to use in place of the URDF that the task names. The task's ``robot`` part also applies to a
-        given robot: it is added to the robot's settings.
+        URDF file or robot to use in place of the URDF that the task names. The task's ``robot`` section also applies to
+        a given robot: it is added to the robot's settings.
     settings : RobotSettings
-        The task's ``robot`` part.
+        The task's ``robot`` section.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def _current_settings(robot: Robot) -> RobotSettings:
 
 
 def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
-    """Return the robot with joints held at positions, rad or m; the others keep their limits and friction."""
+    """Return the robot with joints held at positions, rad or m; other joints keep their limits and friction."""
     names = robot.urdf_joints
     moving = [i for i, name in enumerate(names) if name not in positions]
     settings = _current_settings(robot)
@@ -172,7 +172,7 @@ def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
 
 
 def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
-    """State the friction of some joints, given by their indices."""
+    """Write the friction of some joints, given by their indices, as settings."""
     keys = ("armature", "viscous", "coulomb", "coulomb_velocity")
     columns = friction.table[list(joints)].T.tolist()
     return FrictionSettings.model_validate(dict(zip(keys, columns, strict=True)))
@@ -181,9 +181,10 @@ def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
 def _combine(
     robot: Robot, robot_settings: RobotSettings, task_settings: RobotSettings
 ) -> RobotSettings:
-    """Merge the settings of the robot and of the task. The URDF is that of the robot.
+    """Merge the settings of the robot and of the task. The URDF always comes from the robot.
 
-    In the task, a key counts as set if it is written. In the robot, it counts as set if its value is not the default.
+    In the task, a key counts as set if it is written. In the robot, a key counts as set if its value is not the
+    default.
     """
     robot_keys = robot_settings.model_dump(exclude_defaults=True)
     written = task_settings.model_dump(exclude_unset=True, exclude={"urdf"})
@@ -238,9 +239,9 @@ def _merge(key: str, robot_value: Any, task_value: Any, names: Sequence[str]) ->
 
 
 def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
-    """Describe in words what is in use, with units: payload, placements, gravity, scaled limits, armature, friction.
+    """Describe a robot in words, with units: payload, placements, gravity, scaled limits, armature, friction.
 
-    The description of friction says where it comes from: from the URDF, unless the task states it. Joints without an
+    The description of friction says whether the values come from the URDF or from the task. Joints without an
     acceleration limit or without a torque limit are also named. If accelerations of a motion, (K, n), are given, the
     largest acceleration without a limit is named. Without masses, the torques are described as unknown.
     """
@@ -297,13 +298,13 @@ def _torques_in_use(robot: Robot) -> dict[str, str]:
         figures = getattr(robot.friction, kind)[: len(stated)]
         shown = _by_joint(robot, kind) if figures.any() else "none"
         same = np.array_equal(figures, stated)
-        origin = "as the URDF states it" if same else "other than the URDF's"
+        origin = "as in the URDF" if same else "different from the URDF"
         used[title] = f"{shown} ({origin})"
     return used
 
 
 def _without_limit(robot: Robot, kind: str, motion: np.ndarray | None = None) -> str:
-    """Name the joints without a limit of this kind, and their largest figure in a motion, (K, n)."""
+    """Name the joints without a limit of this kind, and the largest figure of these joints in a motion, (K, n)."""
     names = robot.urdf_joints
     ends = robot.limits.both_ways(kind)[:, : len(names)]
     is_free = ~np.isfinite(ends).all(axis=0)

@@ -1,4 +1,4 @@
-"""Joint positions as points of a joint space: remaining joints, differences of angles, turns by 2 pi.
+"""Calculations with joint positions: remaining joints, differences of angles, turns by 2 pi.
 
 Units of joint quantities depend on the unit of the joint's position: rad for revolute, m for prismatic joints.
 """
@@ -17,12 +17,12 @@ TURN = 2.0 * np.pi
 
 
 def complement(n: int, joints: Iterable[int]) -> list[int]:
-    """Return those of n joints that are not in `joints`, ascending."""
+    """Return the indices, from 0 to n - 1, that are not in `joints`, ascending."""
     return sorted(set(range(n)).difference(joints))
 
 
 def principal(angles: np.ndarray) -> np.ndarray:
-    """Return angles in [-pi, pi)."""
+    """Return the equivalent angles in [-pi, pi)."""
     return np.remainder(angles + np.pi, TURN) - np.pi
 
 
@@ -45,11 +45,11 @@ UNITS: Final[dict[str, dict[str, str]]] = {
     "coulomb": {"rad": "Nm", "m": "N"},
     "armature": {"rad": "kg m^2", "m": "kg"},
 }
-"""Units of joint quantities by the key of the limit or friction in the task, and by the unit of the position."""
+"""Units of joint quantities, by the key of the limit or friction term in the task and by the unit of the position."""
 
 
 def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:
-    """Return the unit in which figures of an SI unit are shown to a person, and the factor for the conversion.
+    """Return the unit in which figures in an SI unit are shown to a person, and the conversion factor.
 
     With `degrees`, angles and their time derivatives are shown in deg, deg/s, ...; other units do not change.
     """

@@ -27,9 +27,9 @@ TorqueSpeedCurve = tuple[tuple[float, float], ...]
 """Points (speed, torque), rad/s or m/s and Nm or N, beginning at speed 0; empty without a curve."""
 
 FARTHEST = 1e6
-"""Largest magnitude of the end of a position range, rad or m: there, numbers are rounded to a tenth of a nanometre."""
+"""Maximum magnitude of an end of a position range, rad or m. Numbers of this magnitude are rounded to 0.1 nm."""
 MAGNITUDES = tuple(kind for kind, row in LIMIT_KINDS.items() if row.form != "range")
-"""Kinds of joint limits that are figures around zero, not ranges."""
+"""Kinds of joint limits that are magnitudes, not ranges."""
 _ARRAYS = tuple(name for row in LIMIT_KINDS.values() for name in row.ends)
 
 _Figures: Any = make_dataclass(
@@ -48,13 +48,13 @@ class Limits(_Figures, Summary):  # type: ignore[misc]
     Attributes
     ----------
     position_lower, position_upper : (n,) ndarray
-        rad or m.
+        Ends of the ranges, rad or m.
     velocity_lower, velocity_upper : (n,) ndarray
-        Below and above zero, rad/s or m/s.
+        Limits in the negative and in the positive direction, rad/s or m/s.
     acceleration : (n,) ndarray
         rad/s^2 or m/s^2.
     torque_lower, torque_upper : (n,) ndarray
-        Below and above zero, Nm or N.
+        Limits in the negative and in the positive direction, Nm or N.
     power : (n,) ndarray
         W.
     rms_torque : (n,) ndarray
@@ -78,21 +78,21 @@ class Limits(_Figures, Summary):  # type: ignore[misc]
 
     @property
     def velocity(self) -> np.ndarray:
-        """Speed limit of every joint, (n,), that holds in both directions, rad/s or m/s."""
+        """Speed limit of every joint, (n,), that applies in both directions, rad/s or m/s."""
         return np.minimum(self.velocity_upper, -self.velocity_lower)
 
     @property
     def torque(self) -> np.ndarray:
-        """Torque limit of every joint, (n,), that holds in both directions, Nm or N."""
+        """Torque limit of every joint, (n,), that applies in both directions, Nm or N."""
         return np.minimum(self.torque_upper, -self.torque_lower)
 
     def both_ways(self, kind: str) -> np.ndarray:
-        """Return the lower and upper limits, (2, n), of a kind out of `LIMIT_KINDS`."""
+        """Return the lower and upper limits, (2, n), of one of `LIMIT_KINDS`."""
         ends = [getattr(self, name) for name in LIMIT_KINDS[kind].ends]
         return np.array(ends if len(ends) == 2 else [-ends[0], ends[0]])
 
     def with_magnitudes(self, **magnitudes: np.ndarray) -> Limits:
-        """Replace the limits of some of `MAGNITUDES` by others, (n,), which are the same in both directions."""
+        """Replace the limits of some of `MAGNITUDES` by new ones, (n,), which are the same in both directions."""
         ends: dict[str, Any] = {}
         for kind, values in magnitudes.items():
             ends |= _arrays_of(kind, np.array([-values, values]))
@@ -115,7 +115,7 @@ class Limits(_Figures, Summary):  # type: ignore[misc]
 
 
 def _arrays_of(kind: str, pairs: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of a kind, by name, from lower and upper limits, (2, n)."""
+    """Return the arrays of one kind of limit, by name, from lower and upper limits, (2, n)."""
     names = LIMIT_KINDS[kind].ends
     return dict(zip(names, pairs[-len(names) :], strict=True))
 
@@ -132,13 +132,13 @@ class UrdfLimit:
     """True if a revolute or prismatic joint states no range, so that the task has to state it."""
 
     def of_kind(self, kind: str) -> float | None:
-        """Return the limit of a kind out of `MAGNITUDES`; None without a limit."""
+        """Return the limit of one of `MAGNITUDES`; None if there is no limit."""
         value: float | None = getattr(self, LIMIT_KINDS[kind].urdf, None)
         return value
 
 
 def check_limits(spec: LimitSpec, names: Sequence[str]) -> LimitSpec:
-    """Check a user's limits, and state them joint by joint, so that limits of other joints can be added.
+    """Check a user's limits, and write them joint by joint, so that limits of other joints can be added.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def resolve_limits(
     urdf : sequence of UrdfLimit
         Limits of the same joints in the URDF.
     speed_override : float, optional
-        Factor on velocity limits, besides those in `spec`.
+        Factor on velocity limits, in addition to the factors in `spec`.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def resolve_limits(
         _resolve_curve(points, name, spec.scale.torque)
         for name, points in zip(names, listed, strict=True)
     )
-    # A torque that falls with speed is largest at rest. This torque is a plain limit.
+    # A torque limit that falls with speed is highest at rest. The value at rest is a plain limit.
     stall_torques = np.array([curve[0][1] if curve else np.inf for curve in curves])
     pairs["torque"] = np.clip(pairs["torque"], -stall_torques, stall_torques)
     is_free = np.isinf(pairs["torque"][1]) & np.isinf(pairs["acceleration"][1])
@@ -224,7 +224,7 @@ def resolve_limits(
             joint=free[0],
             key=f"robot.limits.acceleration{joint} or robot.limits.torque{joint}",
             found=f"none for {', '.join(free)}",
-            allowed="one of them; an effort of 0 in the URDF is no limit, and torque limits need its masses",
+            allowed="one of them; an effort of 0 in the URDF is no limit, and torque limits need masses in the URDF",
         )
     if speed_override != 1.0 and np.isinf(pairs["velocity"]).all():
         raise InputError(
@@ -243,7 +243,7 @@ def resolve_limits(
 
 
 def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
-    """Leave out the limits of joints that are held."""
+    """Return the limits without the limits of joints that are held."""
     changed: dict[str, Any] = {
         kind: {name: limit for name, limit in value.items() if name not in joints}
         for kind, value in vars(spec).items()
@@ -253,7 +253,7 @@ def without_joints(spec: LimitSpec, joints: Collection[str]) -> LimitSpec:
 
 
 def to_spec(limits: Limits, names: Sequence[str]) -> LimitSpec:
-    """State the limits joint by joint, for the joints with these names; further joints are left out."""
+    """Write the limits joint by joint, for the joints with these names; other joints are left out."""
     spec: dict[str, Any] = {}
     for kind, row in LIMIT_KINDS.items():
         ends = limits.both_ways(kind).T[: len(names)].tolist()
@@ -307,7 +307,7 @@ def _check_ranges(ranges: np.ndarray, names: Sequence[str]) -> None:
                 joint=name,
                 key=f"robot.limits.position.{name}",
                 found=f"[{lower:g}, {upper:g}]",
-                allowed=f"ends 1e-09 rad or m apart, within {FARTHEST:g} rad or m of zero; null for an open end",
+                allowed=f"ends at least 1e-09 rad or m apart, within {FARTHEST:g} of zero; null for an open end",
             )
 
 
@@ -336,7 +336,7 @@ def _scale_limits(
 
 
 def _resolve_figure(kind: str, spec: LimitSpec) -> float:
-    """Return the scaled figure of a kind out of `ROBOT_LIMITS`; infinite without a limit."""
+    """Return the scaled figure of one of `ROBOT_LIMITS`; infinite if there is no limit."""
     row = ROBOT_LIMITS[kind]
     stated = getattr(spec, kind)
     if stated is None:

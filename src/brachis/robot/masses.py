@@ -1,7 +1,7 @@
-"""Which features need dynamics, and thus the masses of the robot. This is decided only here.
+"""The features that need dynamics, and thus the masses of the robot. Only this module decides which they are.
 
 Torques need the mass of the bodies that each joint moves. The same holds for limits on torques, torque rates, mean
-torques and powers, for a payload, and for friction that the task states. Everything else is kinematics.
+torques and powers, for a payload, and for friction that the task states. Everything else needs only kinematics.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def check_masses(dynamics: UrdfDynamics, source: str, users: Sequence[str]) -> N
     source : str
         Name of the URDF, for messages.
     users : sequence of str
-        Features that need masses; see `list_users`. Nothing is refused if it is empty.
+        Features that need masses; see `list_users`. Nothing is refused if the list is empty.
 
     Raises
     ------

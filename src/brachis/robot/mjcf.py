@@ -1,8 +1,8 @@
 """Conversion of MJCF files, the format of MuJoCo, to the text of a URDF.
 
-MuJoCo compiles them, because Pinocchio 4.1 misreads some of them. It takes the ranges of slides as degrees. It ignores
-the placement of the first body, all other bodies of the world, sites of fixed bodies and the forces of actuators. It
-supports neither ``limited`` nor ``include``.
+MuJoCo compiles the files, because Pinocchio 4.1 misreads some of them. Pinocchio reads the ranges of slides as degrees.
+It ignores the placement of the first body, all other bodies of the world, sites of fixed bodies and the forces of
+actuators. It supports neither ``limited`` nor ``include``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def urdf_of_mjcf(path: Path) -> str:
     """Read an MJCF file and the files that it includes, and write it as a URDF.
 
     Joint positions are those of the file, including ``ref``. The torque limit of a joint is the smaller side of
-    ``actuatorfrcrange``, or the sum of the forces of its actuators if it is less.
+    ``actuatorfrcrange``, or the sum of the forces of its actuators if this sum is less.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def urdf_of_mjcf(path: Path) -> str:
         ) from error
     text = ", ".join(_list_omitted(compiled))
     if text:
-        text = f"{path}: without counterpart in a URDF, and left out: {text}"
+        text = f"{path}: left out, because a URDF has no counterpart: {text}"
         warnings.warn(text, BrachisWarning, stacklevel=2)
     return write_urdf(_model_of(compiled))
 
@@ -131,7 +131,7 @@ def _pose(position: np.ndarray, quaternion: np.ndarray) -> pin.SE3:
 def _add_joint(
     model: pin.Model, joint: Any, parent: int, placement: pin.SE3, effort: float
 ) -> int:
-    """Add a joint and return its number. At the position ``ref``, bodies are where the file places them."""
+    """Add a joint and return its number. At the joint position ``ref``, bodies are where the file places them."""
     name = joint.name or f"joint_{joint.id}"
     if joint.type[0] < _SLIDE:  # free and ball joints
         return int(model.addJoint(parent, pin.JointModelFreeFlyer(), placement, name))
@@ -152,11 +152,11 @@ def _add_joint(
 
 
 _NEGLIGIBLE = pin.Inertia.FromSphere(1e-9, 1e-3)
-"""Inertia between two joints of one body, where nothing moves, kg and m. A mass of 0 would look like a missing mass."""
+"""Negligible inertia of the link between two joints of one body. A mass of 0 would look like a missing mass."""
 _ON_JOINT = 1
-"""MuJoCo's largest code of a transmission to a joint."""
+"""Largest code that MuJoCo uses for a transmission to a joint."""
 _SLIDE = 2
-"""MuJoCo's code of a prismatic joint; free and ball joints have smaller codes."""
+"""MuJoCo's code for a prismatic joint; free and ball joints have smaller codes."""
 
 
 def _effort_limits(compiled: Any) -> np.ndarray:
@@ -178,5 +178,5 @@ def _effort_limits(compiled: Any) -> np.ndarray:
 
 
 def _smaller_side(ranges: np.ndarray, limited: np.ndarray) -> np.ndarray:
-    """Return the smaller magnitude of the ends of ranges, (N, 2); infinite for a range that is no limit."""
+    """Return the smaller magnitude of the ends of ranges, (N, 2); infinite for a range that is not a limit."""
     return np.where(limited, np.abs(ranges).min(axis=1), np.inf)

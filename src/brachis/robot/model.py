@@ -18,7 +18,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     ----------
     chain : UrdfChain
     settings : RobotSettings
-        Its gravity, mounting, payload and tool offset are used.
+        Settings of the robot; only gravity, mounting, payload and tool offset are used.
     where : str
         Name of the URDF, for messages.
 

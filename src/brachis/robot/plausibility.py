@@ -43,13 +43,13 @@ class Issue:
     where : str
         Key of the task, or joint or link of the robot.
     message : str
-        What it looks like.
+        What the figure looks like.
     found : str
         The figure, with its unit.
     usual : str
         The usual range of such figures.
     advice : str
-        What to write instead; empty without advice.
+        What to write instead; empty if there is no advice.
     """
 
     where: str
@@ -69,7 +69,7 @@ class Issue:
 
 
 def _join(stem: str, group: list[Issue]) -> Issue:
-    """Join several issues that have the same message and stand below one key."""
+    """Join several issues that have the same message and belong to one key."""
     if len(group) == 1:
         return group[0]
     figures = ", ".join(
@@ -82,7 +82,7 @@ def _join(stem: str, group: list[Issue]) -> Issue:
 def report_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Warn of issues, or refuse some or all of them. Return them, with one issue for all joints with the same message.
+    """Warn of issues, or refuse some or all of them. Return them; joints with the same message share one issue.
 
     Warnings refer to the caller of the function that calls this one. Otherwise see `refuse_issues`.
     """
@@ -95,13 +95,13 @@ def report_issues(
 def refuse_issues(
     issues: tuple[Issue, ...], *, strict: bool | None
 ) -> tuple[Issue, ...]:
-    """Refuse some or all issues. Return them, with one issue for all joints with the same message.
+    """Refuse some or all issues. Return them; joints with the same message share one issue.
 
     Parameters
     ----------
     issues : tuple of Issue
     strict : bool or None
-        Whether issues are errors. None: only those of the start posture and of named postures are.
+        Whether issues are errors. If None, only issues of the start posture and of named postures are errors.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def link_lengths(robot: Robot) -> list[float]:
 
 
 def reach(robot: Robot) -> float:
-    """Return an upper bound on the distance of the tool frame from the first joint, m, for the slides' ranges."""
+    """Return an upper bound on the distance of the tool frame from the first joint, m, within the slides' ranges."""
     farthest = np.abs(robot.limits.both_ways("position")).max(axis=0)
     slides = [
         max(farthest[i], abs(urdf.lower or 0.0), abs(urdf.upper or 0.0))
@@ -207,7 +207,7 @@ def distances_from_base(
 
 
 _ROUNDED = 1e-3
-"""Tolerance for positions, m, and entries of rotation matrices: positions are given to the millimetre."""
+"""Tolerance for positions, m, and entries of rotation matrices; positions are often given to the millimetre."""
 
 
 def position_hint(value: float, lower: float, upper: float, unit: str) -> str | None:
@@ -223,8 +223,8 @@ def position_hint(value: float, lower: float, upper: float, unit: str) -> str | 
 
 
 def distance_hint(away: float, far: float) -> str | None:
-    """Return a hint if a path at a distance `away` from the first joint, m, looks like mm for the reach `far`, m."""
-    # A path that is only slightly out of reach is not hundreds of times as far away.
+    """Return a hint if a path at a distance `away` from the first joint, m, may be in mm, given the reach `far`, m."""
+    # A path in mm is hundreds of times too far away, not only slightly out of reach.
     if 0.05 * far < away / 1000.0 < 3.0 * far:
         return (
             f"The path looks like mm: divided by 1000 it is {away / 1000.0:.3g} m away"
@@ -233,7 +233,7 @@ def distance_hint(away: float, far: float) -> str | None:
 
 
 def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str | None:
-    """Return a hint if a stated position, (p,), where the tool is not, looks like mm or like swapped rows."""
+    """Return a hint if a stated position, (p,), that is not the tool's, may be in mm or have swapped rows."""
     if not np.abs(here - stated).max(initial=0.0) > _ROUNDED:
         return None
     is_at_origin = np.abs(here).max() <= _ROUNDED
@@ -244,7 +244,7 @@ def place_hint(here: np.ndarray, stated: np.ndarray, rows: Sequence[str]) -> str
     for order in itertools.permutations(range(len(here))):
         if np.abs(here[list(order)] - stated).max() <= _ROUNDED:
             names = ", ".join(rows[i] for i in order)
-            return f"It looks like the order {names}: the tool is there if they are read so"
+            return f"The numbers may be in the order {names}: read in this order, they are where the tool is"
     return None
 
 

@@ -27,7 +27,7 @@ def read_posture(
     names : sequence of str
         The joints of the chain.
     defaults : mapping of str to float
-        Positions of the last joints, which may be left out.
+        Default positions of the last joints, which may be left out of `joints`.
     where : str
         Where the posture is given, for messages.
 

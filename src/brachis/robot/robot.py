@@ -69,7 +69,7 @@ class Robot(Summary):
     friction : Friction
         Torque terms that are not in the rigid-body model.
     settings : RobotSettings
-        The settings from which the robot was built, as in the ``robot`` part of a task.
+        The settings from which the robot was built, as in the ``robot`` section of a task.
     source : str
         The URDF file that the robot was read from.
     urdf : str
@@ -99,7 +99,7 @@ class Robot(Summary):
     tool_joints: tuple[ToolJoint, ...] = ()
 
     def __new__(cls, *arguments: object, **named_fields: object) -> Self:
-        """Refuse a file name: it belongs to `from_urdf`."""
+        """Refuse a file name, which `from_urdf` reads."""
         if arguments or (named_fields and "model" not in named_fields):
             raise InputError(
                 "a robot cannot be made from these arguments",
@@ -126,7 +126,7 @@ class Robot(Summary):
         urdf_text : str, optional
             Text of the URDF, if it is already known; `path` is then only a name.
         **keywords
-            Keys of the ``robot`` part of a task. None stands for the default.
+            Keys of the ``robot`` section of a task. None stands for the default.
         tool_frame : str, optional
             Link at the end of the chain. Default: the only leaf link.
         base_frame : str, optional
@@ -142,7 +142,7 @@ class Robot(Summary):
             ``armature``, ``viscous``, ``coulomb``, ...: keys of `FrictionSettings`. Keys that are left out keep the
             values of the URDF.
         payload : mapping or Payload, optional
-            ``mass``, kg; ``com``, (3,) m, and ``inertia`` about it, kg m^2, in the tool frame of the URDF.
+            ``mass``, kg; ``com``, (3,) m, and ``inertia`` about ``com``, kg m^2, both in the tool frame of the URDF.
         tool_offset : mapping or Placement, optional
             ``xyz``, m, and ``rpy_deg``: pose of the frame that follows the path, in the tool frame of the URDF.
         mounting : {"floor", "wall", "ceiling"}, mapping or Placement, optional
@@ -153,13 +153,13 @@ class Robot(Summary):
         Raises
         ------
         UrdfError, UnknownNameError, LimitError, InputError
-            A `TaskError` is an `InputError`: a keyword has a wrong form.
+            The URDF or a keyword is wrong. A keyword with a wrong form raises a `TaskError`, which is an `InputError`.
         """
         content = {key: value for key, value in keywords.items() if value is not None}
         content["urdf"] = str(Path(path).absolute())
         unchecked = {}
         if isinstance(content.get("limits"), LimitSpec):
-            # It is checked later, when the joints are known.
+            # A `LimitSpec` is checked later, when the joints are known.
             unchecked["limits"] = content.pop("limits")
         settings = check_robot_settings(content).model_copy(update=unchecked)
         return cls.from_settings(settings, str(path), urdf_text)
@@ -182,7 +182,7 @@ class Robot(Summary):
         frame : str, optional
             Body or added frame that follows the path; used in place of ``tool_frame``.
         geometry : pinocchio.GeometryModel, optional
-            Solids of the links, for the computation of distances.
+            Solids of the links, from which distances are computed.
         **keywords
             As for `from_urdf`.
 
@@ -201,7 +201,7 @@ class Robot(Summary):
     def from_settings(
         cls, settings: RobotSettings, source: str, urdf_text: str | None = None
     ) -> Robot:
-        """Build the robot from the ``robot`` part of a task.
+        """Build the robot from the ``robot`` section of a task.
 
         Parameters
         ----------
@@ -405,14 +405,14 @@ class Robot(Summary):
 
     @cached_property
     def scales(self) -> np.ndarray:
-        """Typical motion of each joint, (n,): 1 rad or m; for a virtual joint at most half of its range."""
+        """Typical size of a motion of each joint, (n,): 1 rad or m; for a virtual joint, at most half of its range."""
         halves = [0.5 * (joint.upper - joint.lower) for joint in self.tool_joints]
         return np.append(np.ones(len(self.urdf_joints)), np.minimum(halves, 1.0))
 
     def posture(self, joints: object, where: str) -> np.ndarray:
         """Check a list or mapping of joint positions, and return them in chain order, (n,), rad or m.
 
-        Positions of virtual joints may be left out. They are then zero, or at the closest end of the range.
+        Positions of virtual joints may be left out. Their default is zero, or the end of the range closest to zero.
 
         Raises
         ------
@@ -444,7 +444,7 @@ class Robot(Summary):
     def place_joints(self, q: np.ndarray) -> Iterator[pin.Data]:
         """Yield Pinocchio's placements of all joints and of the tool frame, posture by posture, for postures (K, n).
 
-        They share one workspace: copy the data that you keep.
+        All placements share one workspace, so copy data that you want to keep.
         """
         model = self.model
         data = model.createData()
@@ -493,7 +493,7 @@ class Robot(Summary):
 
 
 def _without_defaults(settings: RobotSettings) -> RobotSettings:
-    """Leave out settings that have their default value, so that they can be set later."""
+    """Return the settings without those that have their default value, so that these can be set later."""
     default = RobotSettings()
     return RobotSettings(
         **{key: value for key, value in settings if value != getattr(default, key)}

@@ -4,9 +4,9 @@ The pose of the tool is the pose on the path, displaced and turned in the axes o
 
     tool = path Tr(x, y, z) Rx(-side) Ry(lead) Rz(roll).
 
-So the pose on the path is the end of a longer chain. Beyond the tool, its joints turn about -z, -y and x and slide
-along -x, -y and -z. They have no mass, and no limits except their ranges. The position of such a joint is a deviation
-of the tool from the path.
+So the pose on the path is the end of a longer chain. After the tool, the joints of this chain turn about -z, -y and x
+and slide along -x, -y and -z. They have no mass, and no limits except their ranges. The position of such a joint is a
+deviation of the tool from the path.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from brachis.task import Tolerances
 from brachis.task.fields import POSITION
 
 FREE_ROLL = "pose_free_roll"
-"""Name of the task space of poses whose roll about the tool axis is free."""
+"""Name of the task space of poses in which the roll about the tool axis is free."""
 AXIS = "axis"
-"""Word for the direction of the tool's z axis, as a row of a task space or alone."""
+"""Word for the direction of the tool's z axis; it may be a row of a task space, or stand alone."""
 _DIRECTIONS = {
     "roll": (0.0, 0.0, -1.0),
     "lead": (0.0, -1.0, 0.0),
@@ -44,7 +44,7 @@ class ToolJoint:
     Attributes
     ----------
     direction : {"roll", "lead", "side", "x", "y", "z"}
-        Direction in which it moves the tool.
+        Direction in which the joint moves the tool.
     lower, upper : float
         Ends of its range, rad or m; infinite if the joint is free.
     key : str

@@ -1,6 +1,6 @@
-"""The chain from base to tool of a URDF: its joints, the positions of all other joints, and what is refused.
+"""The chain from base to tool of a URDF: its joints, the positions of all other joints, and checks.
 
-For a robot with several limbs or with fingers, also the default chain.
+For a robot with several limbs or with fingers, the module also finds the default chain.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def _check_joints(
 ) -> None:
     """Refuse joints that a serial chain of one-coordinate joints cannot contain.
 
-    Joints on the path from base to tool that do not move are not in the chain. A mimic joint beside the path is held.
+    Joints on the path from base to tool that do not move are not in the chain. A mimic joint that is not on the path is
+    held.
     """
     if _WORLD in tree.joints:
         raise UrdfError(
@@ -75,7 +76,7 @@ def _check_joints(
                 f"the axis of joint {name!r} has zero length",
                 where=where,
                 found=f"<axis xyz={' '.join(f'{component:g}' for component in axis)!r}>",
-                allowed="a direction, any length but zero",
+                allowed="a direction, of any length except zero",
             )
     for name in path:
         leader = _leader_of(tree.joints[name])
@@ -231,9 +232,9 @@ def _check_locked_position(joint: Element, name: str, position: float) -> None:
 def _lock(
     tree: UrdfTree, names: Sequence[str], positions: Mapping[str, float], where: str
 ) -> dict[str, float]:
-    """Find the positions, rad or m, of held joints: as given, else as mimicked, else as close to 0 as possible.
+    """Find the positions, rad or m, of held joints: the given one, else the mimicked one, else the closest to 0.
 
-    A mimic joint may be outside its own range, if the file says so.
+    A mimic joint may be outside its own range, if the joint that it mimics places it there.
     """
     locked = {
         name: float(positions.get(name, _clip_to_range(tree.joints[name], 0.0)))
@@ -265,7 +266,7 @@ def _lock(
                 where=f"robot.locked_joints.{name}",
                 found=f"{positions[name]:g} {unit}",
                 allowed=f"{position:g} {unit}",
-                hint=f"Leave {name} out, or lock {leader} where {name} needs it",
+                hint=f"Leave {name} out, or lock {leader} at the position that {name} needs",
             )
         locked[name] = position
     return locked
@@ -288,7 +289,7 @@ def read_file(path: Path) -> str:
     Raises
     ------
     UrdfError
-        The file is missing, is not text, is another kind of file of brachis, is not a regular file or is too long; or
+        The file is missing, is not text, is a different kind of brachis file, is not a regular file or is too long; or
         MuJoCo refuses it.
     """
     files.check_kind(path, files.Kind.URDF, UrdfError)
@@ -326,7 +327,7 @@ def _joints_between(tree: UrdfTree, base: str, tool: str, where: str) -> list[st
 
 
 def _clip_to_range(joint: Element, position: float) -> float:
-    """Return the position in the joint's range that is closest to a position."""
+    """Return the position in the joint's range that is closest to a given position."""
     if joint.get("type") == "continuous":
         return position
     lower = number_of(joint, "limit", "lower", -np.inf)
@@ -391,7 +392,8 @@ class DefaultChain:
     base : str or None
         Link from which several limbs branch off; None for a single limb, which begins at the root of the URDF.
     tool : str
-        Last link before the limb itself branches, for example into fingers; the end of a single chain.
+        Last link before the limb itself branches, for example into fingers; the last link of all if the limb does not
+        branch.
     leaves : tuple of str
         Links at the ends of the limb.
     """
@@ -427,7 +429,7 @@ def default_chain(text: str, where: str) -> DefaultChain:
     longest = [chain for chain in chains.values() if count_moving(chain) == most_joints]
     limb = {}
     for leaf, chain in chains.items():
-        # A chain that leaves the limb in its upper half, and moves there, is a branch of it; frames are not fingers.
+        # A chain that leaves the limb in its upper half and has moving joints there is a branch; fixed frames are not.
         shared = count_moving(_common_beginning([longest[0], chain]))
         if 2 * shared >= most_joints and (
             count_moving(chain) > shared or shared == most_joints

@@ -16,7 +16,7 @@ from brachis.task import Placement
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Body(Summary):
-    """The body that one joint of a chain moves: its child link and all links that are fixed to it.
+    """The body that one joint of a chain moves: the joint's child link and all links that are fixed to this link.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class UrdfDynamics(Summary):
         ``viscous``: damping, Nm s/rad or N s/m. ``coulomb``: friction, Nm or N. ``armature``: kg m^2 or kg, written
         only by `write_urdf`. Zero if not stated.
     links : dict of str to tuple of int and (4, 4) ndarray
-        For every link the number of the joint that moves it, counted from 1, and the link's placement in the joint's
+        For every link, the number of the joint that moves it, counted from 1, and the link's placement in the joint's
         frame. For a link that does not move: 0, and its placement in the root link.
     """
 
@@ -86,7 +86,7 @@ def read_dynamics(
     tree : UrdfTree
         The URDF; its numbers have been checked.
     chain : sequence of str
-        Moving joints.
+        Moving joints of the chain.
     locked : mapping of str to float
         Positions of the other joints, rad or m.
     tool : str
@@ -168,7 +168,7 @@ def _axis(joint: Element) -> np.ndarray:
 
 
 def mass_of(link: Element) -> float:
-    """Return the mass of a checked link, kg. Without a mass, its moments of inertia are ignored."""
+    """Return the mass of a checked link, kg. If a link has no mass, its moments of inertia are ignored."""
     return number_of(link, "inertial/mass", "value", 0.0)
 
 
@@ -212,7 +212,7 @@ def check_inertia(
 
 
 def _spread(lever: np.ndarray) -> np.ndarray:
-    """Return the inertia of a point of 1 kg at `lever`, (3,) m, about the origin, kg m^2."""
+    """Return the inertia of a 1 kg point mass at `lever`, (3,) m, about the origin, kg m^2."""
     return np.dot(lever, lever) * np.eye(3) - np.outer(lever, lever)
 
 

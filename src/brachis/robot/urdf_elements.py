@@ -1,6 +1,6 @@
-"""The elements of a URDF: well-formed XML without macros, unique names, links that joints connect to one tree.
+"""The elements of a URDF: well-formed XML without macros, with unique names, and with links that form one tree.
 
-Every number that is used must be finite: other parsers silently drop an inertia that contains a NaN.
+Every number that brachis uses must be finite: other parsers silently drop an inertia that contains a NaN.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _robot_element(text: str, where: str) -> Element:
 
 
 def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
-    """Return the links or joints by their names."""
+    """Return the links, or the joints, of a robot by their names."""
     named: dict[str, Element] = {}
     repeated: dict[str, None] = {}
     for element in robot.findall(kind):
@@ -230,11 +230,11 @@ class Entry:
     attribute : str
     unit : str
     count : int, optional
-        How many numbers there are, separated by spaces.
+        Number of values, which are separated by spaces.
     required : bool, optional
         Whether the element must have the attribute.
     largest : float, optional
-        Largest magnitude.
+        Maximum magnitude.
     """
 
     path: str
@@ -276,7 +276,7 @@ ENTRIES: dict[str, tuple[Entry, ...]] = {
 def numbers_of(
     owner: Element, path: str, attribute: str, absent: str
 ) -> tuple[float, ...]:
-    """Return the numbers of a checked attribute of a link or joint; those of `absent` if it is missing."""
+    """Return the numbers of a checked attribute of a link or joint; the numbers in `absent` if it is missing."""
     element = owner.find(path)
     text = absent if element is None else element.get(attribute, absent)
     return tuple(float(word) for word in text.split())
@@ -318,7 +318,7 @@ def _check_entry(owner: Element, entry: Entry, where: str) -> None:
     if entry.count > 1:
         finite = f"{entry.count} finite numbers separated by spaces"
     if entry.largest < sys.float_info.max:
-        finite += f" of at most {entry.largest:g} in size"
+        finite += f" of at most {entry.largest:g} in magnitude"
     hint = None
     if words:
         hint = "Write numbers with decimal points, spaces between them, and no units"

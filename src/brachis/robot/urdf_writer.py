@@ -36,7 +36,7 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
     Raises
     ------
     UrdfError
-        A solid has a different shape.
+        A solid has a shape that cannot be written.
     """
     bodies = {
         frame.parentJoint: number
@@ -59,7 +59,8 @@ def write_urdf(model: pin.Model, geometry: pin.GeometryModel | None = None) -> s
     names = {name for name, _ in origins}
     parents = [origins[parent] for parent in model.parents]
     carriers = [origins[0]]
-    """For every frame the closest link above it, with the link's placement in the frame of the same joint."""
+    """For every frame, the closest link above it, with the placement of this link in the frame of the joint that moves
+    both."""
     for number, frame in enumerate(model.frames[1:], 1):
         joint = frame.parentJoint
         above = model.frames[frame.parentFrame].parentJoint

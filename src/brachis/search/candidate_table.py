@@ -11,7 +11,7 @@ from brachis.search.stages import coordinates
 WORDS = ("joints", "branch", "origin")
 TIMES = ("estimate [s]", "t_end [s]")
 STATUS = "status"
-"""The names of the columns, as in the JSON."""
+"""Names of the columns, as in the JSON output."""
 
 
 def candidate_rows(candidates: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:

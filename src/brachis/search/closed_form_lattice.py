@@ -1,12 +1,10 @@
 """The lattice of one choice of redundant joints, whose closed form gives the postures.
 
-The ranges of the redundant joints are cut into cells. A node is a cell, a branch and
-the posture that the closed form gives there. Every node is joined to the surrounding
-cells at the next station, on the same branch and clear of its boundary. A single
-redundant joint is searched completely at the lattice's spacing. With several redundant
-joints, nodes are joined to neighbours along one joint at a time and to random ones, and
-a layer keeps a bounded number of nodes: half of them with the shortest joint paths,
-half far apart.
+The ranges of the redundant joints are cut into cells. A node is a cell, a branch and the posture that the closed form
+gives there. Every node is joined to the surrounding cells at the next station, on the same branch and clear of the
+branch's boundary. A single redundant joint is searched completely at the lattice's spacing. With several redundant
+joints, nodes are joined to neighbours along one joint at a time and to random ones, and a layer keeps a bounded number
+of nodes: half of them have the shortest joint paths, and half are far apart.
 """
 
 from __future__ import annotations
@@ -37,7 +35,7 @@ class Cells:
     first, last : (r,) int ndarray
         First and last cells at which a motion with a free start may begin.
     window : int
-        Number of cells to either side that are searched at the next station, with a single redundant joint.
+        Number of cells to either side that are searched at the next station, if a single joint is redundant.
     """
 
     origin: np.ndarray
@@ -55,9 +53,9 @@ class Cells:
     ) -> Cells:
         """Lay out the cells of a choice of redundant joints.
 
-        If joint paths begin at a given posture, (n,), it is the middle of a cell. Without one, the cells cover closed
-        ranges, one turn of an open revolute joint, and the part of an open prismatic joint close to the beginning of
-        the path.
+        If joint paths begin at a given posture, (n,), it is the middle of a cell. If no posture is given, the cells
+        cover closed ranges, one turn of an open revolute joint, and the part of an open prismatic joint's range that is
+        close to the start of the path.
         """
         problem = decomposition.problem
         joints = list(decomposition.redundant)
@@ -71,7 +69,7 @@ class Cells:
         else:
             origin = posture[joints]
         reach = np.where(turning, 0.5 * TURN, 2.0 + problem.path.length)
-        # Closed ranges are covered completely, up to 20 rad or m to either side: every cell takes memory.
+        # Closed ranges are covered completely, up to 20 rad or m to either side, because every cell takes memory.
         closed = np.isfinite(low) & np.isfinite(high)
         reach = np.where(closed, np.maximum(reach, 20.0), reach)
         first = np.ceil((np.maximum(low, origin - reach) - origin) / size).astype(int)
@@ -84,7 +82,7 @@ class Cells:
         return len(self.size)
 
     def positions(self, cells: np.ndarray) -> np.ndarray:
-        """Return the redundant joints, (K, r), rad or m, in the middle of cells (K, r)."""
+        """Return the positions of the redundant joints, (K, r), rad or m, in the middle of cells (K, r)."""
         return self.origin + cells * self.size
 
     def near(self, positions: np.ndarray) -> np.ndarray:
@@ -98,7 +96,7 @@ class Cells:
         return rng.integers(self.first, self.last + 1, (count if self.r else 1, self.r))
 
     def neighbours(self, rng: np.random.Generator) -> np.ndarray:
-        """Return offsets to the cells that are tried at the next station, (O, r): all in the window, or a sample."""
+        """Return offsets to the cells that are tried at the next station, (O, r): the whole window, or a sample."""
         if self.r == 1:
             return np.arange(-self.window, self.window + 1)[:, None]
         still = np.zeros((1, self.r), dtype=int)
@@ -127,7 +125,7 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near_start(problem: Problem, joint: int) -> float:
-    """Return where a prismatic joint brings the tool closest to the path's beginning, other joints at zero, m."""
+    """Return the position, m, of a prismatic joint that brings the tool closest to the path's start, others at zero."""
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0
@@ -140,7 +138,7 @@ def _near_start(problem: Problem, joint: int) -> float:
 def solve_all(
     decomposition: Decomposition, targets: np.ndarray, q_r: np.ndarray
 ) -> np.ndarray:
-    """Return postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r); some are NaN."""
+    """Return postures, (C, B, A, n), on all branches for targets (C, m) and redundant joints (C, r), or NaN."""
     n = decomposition.problem.robot.n
     answers = decomposition.match.solver.solve(targets, q_r)
     q = np.empty((*answers.shape[:3], n))
@@ -172,7 +170,7 @@ class ClosedFormLattice(Lattice):
         self._modulo = turning
         self._given_branch = decomposition.branches[0]
         self._cells = Cells.of(decomposition, self._cells_per_turn, self._origin)
-        # Branch margin that nodes keep: 0.02, or half that of the given posture if this is less.
+        # Minimum branch margin of nodes: 0.02, or half the margin of the given posture if this is less.
         self._clear = 0.02
         if self._origin is not None:
             margins = self._solver.branch_margins(
@@ -181,13 +179,13 @@ class ClosedFormLattice(Lattice):
             self._clear = min(0.02, 0.5 * margins.min(initial=np.inf))
 
     def _at_end(self, last: Layer) -> np.ndarray:
-        """Tell which nodes, (K,) bool, are in the cell of the given end, which the plan then reaches exactly."""
+        """Tell which nodes, (K,) bool, are in the cell of the given end posture, which the plan reaches exactly."""
         allowed = np.full(self._robot.n, LARGEST_STEP)
         allowed[self._redundant] = self._cells.size
         return np.all(np.abs(last.q - self.problem.end) <= allowed, axis=1)
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Create nodes all over the ranges of the redundant joints."""
+        """Create nodes spread over the ranges of the redundant joints."""
         cells = self._cells.everywhere(4 * self._nodes, rng)
         branches = np.array(self.decomposition.branches)
         q = self._postures(cells, 0)[:, branches]
@@ -200,7 +198,7 @@ class ClosedFormLattice(Lattice):
         return solve_all(self.decomposition, targets, self._cells.positions(cells))
 
     def _edges(self, before: Layer, station: int, rng: np.random.Generator) -> Edges:
-        """List edges to the surrounding cells; at the last station, also to the cell of the given end."""
+        """List edges to the surrounding cells; at the last station, also to the cell of the given end posture."""
         offsets = self._cells.neighbours(rng)
         nodes = np.arange(len(before.branch))
         node_cells = self._cells.near(before.q[:, self._redundant])

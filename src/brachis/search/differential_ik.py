@@ -1,6 +1,6 @@
 """Joint paths by differential inverse kinematics along the path.
 
-As in the paper, the start posture is carried along the path. The null-space motion increases the branch margin and
+As in the paper, the start posture is continued along the path. The null-space motion increases the branch margin and
 stays within the joint ranges, so that the closed form can follow.
 """
 
@@ -27,7 +27,8 @@ class Strategy:
     threshold : float
         Branch margin below which `push` acts, dimensionless.
     drift : float
-        Constant motion along the first null-space direction, rad or m per unit s, which may lead to another valley.
+        Constant motion along the first null-space direction, rad or m per unit s, which may lead to a different local
+        optimum.
     centre : float
         Strength with which joints are pulled to the middle of their ranges.
     """
@@ -65,8 +66,8 @@ def differential_ik_path(
 ) -> np.ndarray | None:
     """Compute the redundant joints along the path by numeric inverse kinematics from the start posture.
 
-    Close to a branch boundary the posture is first unfolded while the tool stays where it is, because any motion of the
-    tool would need fast joints there.
+    Close to a branch boundary, the posture is first unfolded while the tool stays where it is, because any motion of
+    the tool would need fast joints there.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def differential_ik_path(
     Returns
     -------
     (steps, 1 + r) ndarray or None
-        Successive values of s and the redundant joints; None if the path cannot be followed, or not in time.
+        Successive values of s and the redundant joints; None if the path cannot be followed, or the time is up.
     """
     if joint_map.r == 0:
         return np.array([[0.0], [1.0]])
@@ -113,7 +114,7 @@ def _follow(
     target: np.ndarray,
     step_s: float | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Take one step to the next target; return the new posture and the null-space motion, or None if it is not met.
+    """Take one step to the next target; return the new posture and the null-space motion; None if out of reach.
 
     `step_s` is the step in s, or None to unfold on the spot.
     """

@@ -1,7 +1,7 @@
 """Why a plan failed: errors that explain why a path cannot be followed.
 
-Random postures at stations along the path show which part of it a decomposition reaches, and whether a station is out
-of reach, beyond the joint ranges, on another branch, or too heavy to hold.
+Random postures at stations along the path show which part of the path a decomposition reaches, and whether a station is
+out of reach, beyond the joint ranges, on another branch, or too heavy to hold.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def explain_reach(
     ----------
     decomposition : Decomposition
     deadline : Deadline, optional
-        When the search for the reason ends; if it found none by then, the advice says so.
+        When the search for the reason ends; if no reason was found by then, the advice says so.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def explain_reach(
         return _NO_TIME
     anywhere = postures
     if not _has_any(_exist(postures)).all():
-        # Wider ranges tell whether the ranges of the redundant joints or the arm itself is to blame.
+        # Wider ranges show whether the ranges of the redundant joints or the arm itself is to blame.
         wider = _sample_postures(decomposition, s, near, deadline, opened=True)
         if wider is None:
             return _NO_TIME
@@ -93,10 +93,10 @@ def _find_obstacles(
     postures: np.ndarray,
     anywhere: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, str, str, Sequence[Remedy]]]:
-    """Yield, for each obstacle, which of S stations are free of it, (S,) bool, and its cause, hint and remedies.
+    """Yield for each obstacle the stations, (S,) bool, that are free of it, and the cause, a hint and remedies.
 
     The redundant joints of `postures`, (S, T, B, A, n), are within their ranges; `anywhere` also has postures beyond
-    them. If the task gives a posture, named ``start`` or ``end``, the last obstacles are those on its branch.
+    these ranges. If the task gives a posture, named ``start`` or ``end``, the last obstacles are those on its branch.
     """
     problem = decomposition.problem
     robot = problem.robot
@@ -136,7 +136,7 @@ def _find_obstacles(
 
 
 def _unit_hint(problem: Problem) -> str | None:
-    """Say which figure of the path looks like a different unit; None if all are plausible."""
+    """Say which figure of the path may be in the wrong unit; None if all figures are plausible."""
     issues = [issue for issue in of_places(problem) if issue.where == "path"]
     texts = [
         f"{issue.message[:1].upper()}{issue.message[1:]}: {issue.found}"
@@ -156,7 +156,7 @@ def _are_within(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def _excess(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Return how far joints are beyond their ranges, (..., n), rad or m; negative within, NaN without a posture."""
+    """Return how far joints are beyond their ranges, (..., n), rad or m; negative inside, NaN without a posture."""
     limits = robot.limits
     return np.maximum(limits.position_lower - q, q - limits.position_upper)
 
@@ -191,7 +191,7 @@ def _sample_postures(
         q_r[0] = np.clip(near, low, high)[redundant]
     targets = decomposition.problem.path.sample(s).target
     postures = []
-    # No more than 20,000 postures at once, so that the deadline is noticed.
+    # No more than 20,000 postures are computed at once, so that the deadline is noticed.
     for block in np.array_split(targets, min(len(s), -(-len(s) * tries // 20_000))):
         if deadline.passed:
             return None
@@ -203,7 +203,7 @@ def _sample_postures(
 
 
 def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
-    """Say which joint is out of its range, and how far, in the posture of (T, B, A, n) closest to the ranges."""
+    """Say which joint is out of its range, and how far, in the posture out of (T, B, A, n) closest to the ranges."""
     q = q[_exist(q)]
     if not len(q):
         return ""
@@ -214,7 +214,7 @@ def _describe_nearest(robot: Robot, q: np.ndarray) -> str:
     low = robot.limits.position_lower[joint]
     high = robot.limits.position_upper[joint]
     return (
-        f" (the nearest one has joint {robot.joint_names[joint]!r} {nearest[joint]:.2g} {unit} beyond its range, "
+        f" (in the nearest one, joint {robot.joint_names[joint]!r} is {nearest[joint]:.2g} {unit} beyond its range, "
         f"{low:.4g} to {high:.4g} {unit})"
     )
 
@@ -224,14 +224,15 @@ def _check_at_rest(
 ) -> tuple[np.ndarray, str, list[Remedy]]:
     """Tell at which stations, (S,) bool, a limit allows at least one posture of (S, T, B, A, n) at rest.
 
-    Also say by how much the limit is exceeded at the station whose best posture is the worst, and what to change.
+    Also say by how much the limit is exceeded at the station where even the best posture exceeds it most, and what to
+    change.
     """
     allowed = np.zeros(len(q), dtype=bool)
     worst = 0.0
     lack = ""
     remedies = []
     for station, postures in enumerate(q):
-        # A few dozen postures are enough.
+        # A few dozen postures of each station are enough.
         within = postures[_are_within(robot, postures)][:60]
         if not len(within):
             continue
@@ -249,7 +250,7 @@ def explain_first_failures(
     candidates: Sequence[Candidate],
     deadline: Deadline,
 ) -> PathError | None:
-    """Tell whether the path is out of reach, so that further candidates would be futile.
+    """Tell whether the path is out of reach, because then no further candidates need to be tried.
 
     If lattices were searched and none has a joint path, any unreachable part of the path counts. If no lattice was
     searched, the unreachable part has to be more than a tenth of the path.
@@ -292,11 +293,12 @@ def explain_no_motion(
     decompositions : sequence of Decomposition
     candidates : sequence of Candidate
     dead_ends : mapping of str to DeadEnd
-        The place where each lattice ends, by the names of its redundant joints.
+        The place where each lattice ends; the keys are the names of the lattice's redundant joints.
     deadline : Deadline
         When the search for the reason ends.
     not_completed : sequence of str, optional
-        Work for which the time did not suffice. It is then given as the reason, unless the lattices tell more.
+        Work for which there was not enough time. Lack of time is then given as the reason, unless the lattices show a
+        better one.
     """
     has_joint_path = _has_joint_path(candidates)
     if not_completed:
@@ -335,7 +337,7 @@ def explain_no_motion(
 def _explain_dead_ends(
     task: Task, dead_ends: Mapping[str, DeadEnd], hint_end: str
 ) -> PathError:
-    """Say where the lattice that reached farthest ends."""
+    """Say where the lattice that got farthest along the path ends."""
     name = min(dead_ends, key=lambda name: np.diff(dead_ends[name].interval)[0])
     lattice_name = name if name == ALL_POSTURES else f"redundant joints {name}"
     lattice_note = f" ({lattice_name}; the furthest of {len(dead_ends)} lattices)"
@@ -350,7 +352,7 @@ def _explain_dead_ends(
 
 
 def _advise(task: Task, candidates: Sequence[Candidate]) -> str:
-    """Say what may help if there are joint paths, but no motion along them; name only what has not been tried."""
+    """Say what may help if joint paths were found, but no motion along them; name only what has not been tried."""
     statuses = " ".join(candidate.status for candidate in candidates)
     defaults = SolverSettings()
     solver = task.solver

@@ -1,7 +1,7 @@
-"""The search for the motion of a plan, supported by plans with fewer joints.
+"""The search for the motion of a plan, helped by simpler plans with fewer joints.
 
-A plan whose tool stays exactly on the path is sought before tolerances are used. Afterwards, idle joints, which move no
-row of the task space, are held still unless moving them saves time.
+Before tolerances are used, the search looks for a plan in which the tool stays exactly on the path. Afterwards, idle
+joints, which move no row of the task space, are held still unless moving them saves time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from brachis.trajectory import Trajectory
 Opening = Callable[[Problem, Deadline], Search]
 """A function that opens the search for a problem."""
 _WORTH_MOVING = 2.0
-"""Multiple of the spline tolerance that moving idle joints has to save: either plan may be slower by one tolerance."""
+"""Moving idle joints has to save this multiple of the spline tolerance, as either plan may be slow by one tolerance."""
 
 
 def search_motion(
@@ -34,7 +34,7 @@ def search_motion(
     deadline: Deadline,
     report: Listener,
 ) -> SearchOutcome:
-    """Search for the fastest motion, from a known one if given; raise the error that explains why none was found."""
+    """Search for the fastest motion, from a known motion if given; raise an error that explains why none was found."""
     search = open_search(problem, deadline)
     exact = None
     if known_motion is None and problem.task.tolerances != Tolerances():

@@ -1,12 +1,13 @@
-"""A motion within the limits close to a joint path, found without a solve; it comes first if there is little time.
+"""A motion within the limits close to a joint path, found without a solve; it is sought first if there is little time.
 
 Splines along a joint path nearly meet the limits if they are slow enough. But the splines of the phases are laid one by
 one, so they do not quite meet each other, and limits are exceeded close to their ends. The remedy is the smoothest
 change d of the variables after which the linearised rows are within their bounds:
 
-    minimise   the mean over time of sum_i (weights_i d qddot_i)^2    subject to    lower <= rows(x) + J d <= upper,
+    minimise   the mean over time of sum_i (weights_i d qddot_i)^2    subject to    lower <= rows(x) + J d <= upper.
 
-It is repeated a few times. This takes hundredths of a second, whereas a solve takes tenths of a second, or seconds.
+This step is repeated a few times. All of this takes hundredths of a second, whereas a solve takes tenths of a second,
+or seconds.
 """
 
 from __future__ import annotations
@@ -48,32 +49,34 @@ from brachis.search.stages import (
 from brachis.search.verified import refine_and_verify
 
 LITTLE_TIME = 5.0
-"""Remaining time, s, below which a first motion is sought: a search with more time has a verified motion by then."""
-_NOT_COMPLETED = (
-    "there was time only for a first motion, which may be much slower than the fastest"
-)
+"""A first motion is sought if less time than this remains, s. With more time, the search itself finds a verified
+motion."""
+_NOT_COMPLETED = "there was time only for a first motion, which may be much slower than the fastest motion"
 _SOLVE_SHARE = 0.6
 """Fraction of the remaining time in which a first motion is improved by a solve."""
 _LONGEST_SOLVE = 0.5
-"""Longest time of this solve, s. Within 0.4 s, motions at process speeds became 15 to 35 % faster."""
+"""Maximum time of this solve, s. Within 0.4 s, motions at process speeds became 15 to 35 % faster."""
 _NEARLY = 0.05
-"""Largest violation with which the last iterate of this solve is used."""
+"""Maximum violation with which the last iterate of this solve is used."""
 _ROOM = 1.03
-"""Factor on the end time of this iterate: rows at their bounds would exceed them between the collocation points."""
+"""Factor on the end time of this iterate; otherwise rows at their bounds would exceed them between collocation
+points."""
 _SLOWER = (1.1, 1.5, 2.5)
 """Factors on the end times of the first splines, tried one after the other: with 1 most rows are at their bounds."""
 _CHANGES = 10
-"""Largest number of changes."""
+"""Maximum number of changes."""
 _LEAST_SHARE = 0.02
-"""Smallest fraction of a change that is tried: if no larger one is better, the rows are far from linear."""
+"""Smallest fraction of a change that is tried; if no larger fraction helps, the rows are far from linear."""
 _ROUNDS = 12
-"""Largest number of sets of rows that are tried for a change."""
+"""Maximum number of sets of rows that are tried for a change."""
 _MARGIN = 1e-3
-"""Distance from their bounds at which rows are held, so that few are exceeded between the collocation points."""
+"""Distance from their bounds at which rows are held, so that few bounds are exceeded between the collocation points."""
 _ENOUGH = 1e-10
-"""Violation that is small enough: with 1e-8 the tool moved backwards on its path between knots close to each other."""
+"""Violation that counts as small enough; with 1e-8, the tool moved backwards on its path between knots close to each
+other."""
 _DAMPING = 1e-8
-"""Fraction of a diagonal's largest entry that is added to it: some joints do not count, and rows may be dependent."""
+"""Fraction of the largest diagonal entry that is added to a diagonal: some joints have no weight, and rows may be
+dependent."""
 
 
 def find_first_motion_of(
@@ -101,7 +104,7 @@ def find_first_motion(guess: InitialGuess, deadline: Deadline) -> Candidate:
     Returns
     -------
     Candidate
-        A finished candidate if there is a motion.
+        A `FinishedCandidate` if a motion was found.
     """
     outcome = begin_candidate(guess, "no motion was found near the joint path")
     try:
@@ -230,7 +233,7 @@ def _smoothest_change(program: Program, x: np.ndarray) -> np.ndarray:
         moved = np.linalg.solve(metric, slopes.T)
         forces = np.linalg.solve(_damp(slopes @ moved), goals)
         change = moved @ forces
-        # Rows that are pulled towards their bound are released.
+        # Rows that would otherwise be pulled towards their bound are released.
         is_pulled = np.where(at_low, forces < 0.0, forces > 0.0)
         held[rows[is_pulled & ~is_equal[rows]]] = False
     return change
@@ -250,5 +253,5 @@ def _measure_smoothness(program: Program, x: np.ndarray) -> np.ndarray:
 
 
 def _damp(matrix: np.ndarray) -> np.ndarray:
-    """Make a matrix, (m, m), regular."""
+    """Make a matrix, (m, m), regular by increasing its diagonal."""
     return matrix + _DAMPING * np.diag(matrix).max() * np.eye(len(matrix))

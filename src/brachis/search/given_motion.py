@@ -1,6 +1,6 @@
 """The initial guess from a motion that is already known, of the same task or of a similar one.
 
-Only curves are taken from the motion: the postures over the path coordinate, which are brought onto the path if it has
+Only curves of the motion are used: the postures over the path coordinate, which are brought onto the path if it has
 changed, and the time law. So limits, splines, coordinates and the path may differ from those with which the motion was
 planned.
 """
@@ -58,13 +58,13 @@ def given_guess(
     problem : Problem
     decompositions : sequence of Decomposition
     motion : Trajectory
-        Its task may have different tolerances, or none.
+        A motion whose task may have different tolerances, or none.
     origin : str
 
     Returns
     -------
     InitialGuess
-        A guess for the solver that is tried first.
+        A guess that names the solver that is tried first.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def without_tolerances(task: Task) -> Task:
 def lock_idle(
     robot: Robot, task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> tuple[Robot, Task] | None:
-    """Lock the idle joints, on which no row of the task space depends, in a robot and its task; None if none is idle.
+    """Lock the idle joints, on which no row of the task space depends, in robot and task; None if none is idle.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def lock_idle(
     task : Task
     task_map : TaskMap
     postures : mapping of str to (n,) ndarray
-        The given postures among ``start`` and ``end``. Joints whose positions differ between them are not idle.
+        The given postures, by the names ``start`` and ``end``. Joints whose positions differ between these are not
+        idle.
     """
     count = len(robot.urdf_joints)
     moves = np.abs(task_map.sample_jacobians()).max(axis=(0, 1)) > tolerances.ANGLE
@@ -190,7 +191,7 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
 
 
 def narrow_motion(motion: Trajectory) -> Trajectory:
-    """Undo `widen_plan`: return the motion as one of the simpler task of which it is an optimum.
+    """Undo `widen_plan`: return the motion of the simpler task for which it is optimal.
 
     A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged.
     """
@@ -226,7 +227,7 @@ def narrow_motion(motion: Trajectory) -> Trajectory:
 
 
 def _positions(problem: Problem, motion: Trajectory, t: np.ndarray) -> np.ndarray:
-    """Return positions of the problem's joints at times, (K, n); joints that the motion does not have stand still."""
+    """Return positions of the problem's joints at times, (K, n); joints that are not in the motion stand still."""
     robot = problem.robot
     motion_positions = dict(zip(motion.joint_names, motion.position(t).T, strict=True))
     still = stand_still(robot, problem.given_postures)

@@ -1,8 +1,8 @@
 """Initial guesses: joint paths from lattices, each smoothed, with coordinates and an estimate of its least time.
 
-If several joints are redundant, the lattice's sample of postures may contain only one class of joint paths, above all
-between two given ends, and a solve from such a path ends at the closest optimum. Solves from random joint paths end at
-other optima.
+If several joints are redundant, the lattice's sample of postures may contain only one class of joint paths, especially
+between two given ends. A solve from such a joint path ends at the closest optimum, whereas solves from random joint
+paths end at other optima.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
 
 SCREENED = 4
-"""Number of joint paths that are examined for each one that a level plans."""
+"""Number of joint paths that are examined for each joint path that a level plans."""
 FAMILY = "path of joints"
-"""Family and origin of the guess for a path of joints."""
+"""Family and origin of the guess for a prescribed joint path."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class SearchLevel:
     in_closed_forms : int
         Number of guesses in closed forms that are ranked; those with the least estimated time come first.
     refined : int
-        Largest number of candidates that are refined and verified, as long as they may beat the best one.
+        Maximum number of candidates that are refined and verified, as long as they may beat the best one.
     cells_per_turn, nodes : int
         Options of the lattice.
     only_minima : bool
@@ -87,23 +87,23 @@ class SearchLevel:
 _LATTICE_SHARE = 0.5
 """Fraction of the remaining time after which the lattice is abandoned, and only random joint paths are tried."""
 _RANDOM = 4
-"""Number of random joint paths for each one that a level plans."""
+"""Number of random joint paths for each joint path that a level plans."""
 _RANDOM_STATIONS = 97
 """Approximate number of stations along a random joint path. In 14 tasks, 81 % of the drawn postures reach the end, the
 same as with 385 stations; with 13 stations 78 % do."""
 _DRAWN = 8
-"""Number of postures drawn for each random joint path: on average over 14 tasks 81 % reach the end, 14 % in the
-worst."""
+"""Number of postures drawn for each random joint path: on average over 14 tasks 81 % reach the end, and 14 % in the
+worst task."""
 _DRIFT = 2.0
-"""Largest standard deviation of a drift, rad or m, in the scales of the joints; it displaces the end by half as much.
+"""Maximum standard deviation of a drift, rad or m, in the scales of the joints; it displaces the end by half as much.
 
 On average over 14 tasks, the best of 16 joint paths is 0.5 % slower than with the best of the drifts 1, 2, 4 and 8 for
-each task. With the other drifts it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
+the same task. With other drifts, it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
 """
 _LOOKED_AT = 4
-"""Number of joint paths that are examined for each one that is chosen, if several joints are redundant."""
+"""Number of joint paths that are examined for each joint path that is chosen, if several joints are redundant."""
 _NEARLY = 0.2
-"""Largest violation of a limit at rest with which a joint path still counts as a guess."""
+"""Maximum violation of a limit at rest with which a joint path still counts as a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
 _FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
@@ -119,7 +119,7 @@ SEARCH_LEVELS = {
     "thorough": (_FAST, _THOROUGH),
     "exhaustive": (_FAST, _THOROUGH, _EXHAUSTIVE),
 }
-"""Levels that are tried one after the other, by the task's ``search.effort``, so that a good motion is found soon."""
+"""Levels for each ``search.effort`` of a task, tried one after the other, so that a good motion is found soon."""
 
 
 def lattice_guesses(
@@ -128,7 +128,7 @@ def lattice_guesses(
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
-    """Take the shortest distinct joint paths from a decomposition's lattice; if it has none, from a finer one.
+    """Take the shortest distinct joint paths from a decomposition's lattice; if it has none, from a finer lattice.
 
     If several joints are redundant, more joint paths are examined, and the most promising ones are chosen.
 
@@ -178,7 +178,7 @@ def _take_guesses(
 def _smooth(joint_path: PosturePath) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path coordinates (S,) and postures (S, n) of ever less smooth joint paths; the last is piecewise linear."""
     s = joint_path.s
-    # Sampled more finely than at the lattice's stations.
+    # The samples are closer together than the lattice's stations.
     fine = spread_stations(joint_path.problem, max(2 * len(s) - 1, 97))
     weights = np.ones((len(s), 1))
     weights[[0, -1]] = 1e3  # nearly exact at both ends
@@ -224,7 +224,7 @@ def numeric_guesses(
     Parameters
     ----------
     decomposition : Decomposition
-        A decomposition with a given start posture; without one the list is empty.
+        A decomposition with a given start posture; without a start posture, the list is empty.
     count : int
     deadline : Deadline
 
@@ -305,7 +305,7 @@ def chart_guesses(
         )
         for number, joint_path in enumerate(joint_paths, 1)
     ]
-    # If it runs backwards from a given end, the lattice of one redundant joint has a single joint path.
+    # The lattice of one redundant joint has a single joint path if it runs backwards from a given end.
     is_backwards = problem.start is None and problem.end is not None
     is_sampled = problem.r > 1 or is_backwards
     if is_late or (is_sampled and level.in_charts > 1):
@@ -326,7 +326,7 @@ def chart_guesses(
         return DeadEnd(0.0, NO_TIME if deadline.passed else NO_CHART)
     guesses.sort(key=lambda guess: guess.estimate)
     refuse_hopeless(guesses)
-    # Joint paths whose estimated time is more than three times the least one are hopeless.
+    # Joint paths whose estimated time is more than three times the least estimate are hopeless.
     longest = 3.0 * guesses[0].estimate
     hopeful = [guess for guess in guesses if guess.estimate <= longest]
     return screen(hopeful, level.in_charts, deadline, listener)
@@ -341,14 +341,14 @@ def random_joint_paths(
     ----------
     problem : Problem
     count : int
-        Largest number of joint paths to find.
+        Maximum number of joint paths to find.
     deadline : Deadline, optional
-        If it passes, the list is empty.
+        The list is empty if this time passes.
 
     Returns
     -------
     list of PosturePath
-        Joint paths from and to the given ends, within the joint ranges. Limits at rest may be exceeded by 20 %.
+        Joint paths between the given ends, within the joint ranges. Limits at rest may be exceeded by 20 %.
     """
     rng = np.random.default_rng(problem.task.search.seed)
     newton = Newton(problem.task_map)
@@ -412,7 +412,7 @@ def guess_in_chart(
 def bring_onto_path(
     problem: Problem, newton: Newton | None, s: np.ndarray, q: np.ndarray
 ) -> np.ndarray:
-    """Find the postures (S, n) on the path closest to given ones; at the ends, take those that the task gives.
+    """Find the postures (S, n) on the path closest to given ones; at the ends, use the postures that the task gives.
 
     Raises
     ------
@@ -431,12 +431,12 @@ def bring_onto_path(
 
 
 def joint_space_guess(problem: Problem) -> InitialGuess:
-    """Return the guess for a path of joints, timed in the phase plane.
+    """Return the guess for a prescribed joint path, timed in the phase plane.
 
     Parameters
     ----------
     problem : Problem
-        A problem with a path of joints.
+        A problem with a prescribed joint path.
 
     Returns
     -------

@@ -21,9 +21,9 @@ _HEAVY = 0.95
 _TOO_HEAVY = 1.05
 """The same ratio, in every posture of the path, above which a motion is out of the question."""
 _FAR_TOO_HEAVY = 1.5
-"""The same ratio for a redundant robot, which has other joint paths than those that were found."""
+"""The same ratio for a redundant robot, which has more joint paths than those that were found."""
 _S = np.linspace(0.0, 1.0, 101)
-"""Path coordinates at which the arm is held at rest."""
+"""Path coordinates at which loads at rest are computed."""
 
 
 def explain_beyond(
@@ -38,7 +38,7 @@ def explain_beyond(
     s : (S,) ndarray
         Path coordinates, ascending.
     q : (S, n) ndarray
-        Postures there, rad or m.
+        Postures at these coordinates, rad or m.
     """
     values, beyond = beyond_at_rest(limit, q, problem.task.refinement.tolerance)
     station, column = np.unravel_index(np.argmax(beyond), beyond.shape)
@@ -61,7 +61,7 @@ def explain_beyond(
 
 
 def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
-    """Explain, if all joint paths exceed a limit on postures, which one it is on the path with the least excess."""
+    """If all joint paths exceed a limit on postures, explain the excess on the joint path where it is smallest."""
     nearest = []
     for guess in guesses:
         q = postures_along(guess, _S)
@@ -79,7 +79,7 @@ def explain_postures(guesses: Sequence[InitialGuess]) -> PathError | None:
 
 
 class _Load(NamedTuple):
-    """A load for holding the arm: its least, largest and mean ratio to the limit on its mean."""
+    """A load needed to hold the arm: its smallest, largest and mean ratio to the limit on its mean."""
 
     limit: Limit
     column: int
@@ -92,13 +92,13 @@ class _Load(NamedTuple):
 def explain_holding(
     guesses: Sequence[InitialGuess], *, everywhere: bool = False
 ) -> PlanningError | None:
-    """Tell which limits on means are too low for holding the arm along all joint paths; None if none is.
+    """Tell which limits on mean loads are too low to hold the arm along all joint paths; None if none is.
 
     Parameters
     ----------
     guesses : sequence of InitialGuess
     everywhere : bool, optional
-        Whether every single posture has to exceed a limit, and not only their mean.
+        Whether every single posture has to exceed a limit, and not only the mean over the path.
     """
 
     def measure(load: _Load) -> float:
@@ -111,7 +111,8 @@ def explain_holding(
     loads = min(known, key=lambda loads: max(map(measure, loads)))
     worst = max(loads, key=measure)
     is_redundant = guesses[0].joint_map.r > 0
-    # Before a plan is tried, a motion has to be out of the question; afterwards, the load is the most likely reason.
+    # Before any plan is tried, a load is refused only if no motion is possible. After a failure, it is the most likely
+    # reason.
     hopeless = _FAR_TOO_HEAVY if is_redundant else _TOO_HEAVY
     needed = hopeless if everywhere else _HEAVY
     if measure(worst) < needed:
@@ -157,7 +158,7 @@ def _explain_loads(
 
 
 def _loads_along(guess: InitialGuess) -> list[_Load] | None:
-    """List the loads for holding the arm along a guess, for all limits on means; None if it has no postures."""
+    """List the loads needed to hold the arm along a guess, for all limits on means; None if it has no postures."""
     q = postures_along(guess, _S)
     if q is None:
         return None

@@ -2,9 +2,10 @@
 
 Speeds are given for parts of the path and for its ends. Without friction, if the limits allow a motion and the arm can
 hold its postures, the limits also allow the same motion at a lower speed: its (u, x) lies between that of the motion
-and rest (see `brachis.search.phase_plane`). So a speed can be too high for two reasons. It is too high by itself, along
-its part of the path or at its end, or an adjacent leg is too short to reach it or to brake from it. A redundant robot
-may have better joint paths than the known ones, so only what is far from possible is refused before a plan is tried.
+and rest (see `brachis.search.phase_plane`). So a speed can be too high for two reasons. Either it is too high by
+itself, along its part of the path or at its end, or an adjacent leg is too short to reach this speed or to brake from
+it. A redundant robot may have better joint paths than the known ones, so only what is far from possible is refused
+before a plan is tried.
 
 The phase plane accounts neither for limits on the jerk nor for friction. Friction helps to brake, so that with friction
 a part close to the path's end may be travelled faster.
@@ -33,12 +34,12 @@ from brachis.search.stations import spread_stations
 from brachis.timing import Timing
 
 _EXACT = 0.97
-"""If only a smaller fraction of a speed is possible in the phase plane, and this is exact, the speed is impossible."""
+"""If the phase plane is exact and allows only a smaller fraction of a speed than this, the speed is impossible."""
 _UNLIKELY = 0.4
-"""The same fraction for a redundant robot: below it, no other joint path makes up for what is missing."""
+"""The same fraction for a redundant robot: below it, no other joint path makes up the difference."""
 _REACHED = 0.92
-"""Fraction of the largest speed in the phase plane that is advised: splines over the first mesh do not reach all of
-it."""
+"""Fraction of the highest speed in the phase plane that is advised; splines over the first mesh do not reach that
+speed."""
 _LEAST = 1e-4
 """Fraction of a speed that is possible wherever the arm can hold its postures."""
 
@@ -51,7 +52,7 @@ def refuse_hopeless(guesses: Sequence[InitialGuess]) -> None:
     PlanningError
     """
     problem = guesses[0].problem
-    # Friction may help to hold the arm, and a motion between different speeds may be a fall: such plans are tried.
+    # Friction may help to hold the arm, and a motion between different speeds may be a fall, so such plans are tried.
     if not _has_friction(problem).any() and not any(problem.end_rates):
         failure = explain_holding(guesses, everywhere=True)
         if failure is not None:
@@ -74,12 +75,12 @@ class _Speed:
     Attributes
     ----------
     key, name : str
-        Key in the task, and name in words.
+        Key of the speed in the task, and its name in words.
     figure : float
         Value, in `unit`.
     unit : str
     leg : int
-        Number of the leg whose speed it is, or at whose end it is given.
+        Number of the leg that has the speed, or at whose end the speed is given.
     side : int or None
         End of the leg at which the speed is given, 0 or -1; None if it is given all along the leg.
     """
@@ -121,7 +122,7 @@ def speeds_of(problem: Problem) -> list[_Speed]:
 
 
 class _SpeedCheck:
-    """Tells which fractions of a task's speeds a joint path allows.
+    """Check of which fractions of a task's speeds a joint path allows.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ class _SpeedCheck:
     s : (S,) ndarray
         Path coordinates, including the ends of the legs.
     q : (S, n) ndarray
-        Postures there.
+        Postures at these coordinates.
     """
 
     def __init__(
@@ -151,7 +152,7 @@ class _SpeedCheck:
         self._solve = [cache(plane.solve) for plane in self.planes]
 
     def _find_cap(self, speed: _Speed) -> tuple[float, float, str]:
-        """Return the largest fraction of a speed by itself, and the path coordinate and limit that allow no more."""
+        """Return the largest possible fraction of a speed alone, and the place and the limit that allow no more."""
         plane = self.planes[speed.leg]
         law = self.problem.time_laws[speed.leg]
         if law is not None:
@@ -186,7 +187,7 @@ class _SpeedCheck:
         return free
 
     def pass_leg(self, leg: int, shares: np.ndarray) -> Timing | None:
-        """Time a leg whose speed is free, between fractions of the speeds, (k,); None if it is too short for them."""
+        """Time a leg whose speed is free, between fractions of the speeds, (k,); None if the leg is too short."""
         rates = []
         for side in (0, -1):
             number = self.speed_at(leg, side)
@@ -202,7 +203,7 @@ class _SpeedCheck:
             shares[number] = share
             return self.is_possible(shares)
 
-        # With the other speeds, one that is too low may be as impossible as one that is too high.
+        # Between other speeds, a speed that is too low may be as impossible as one that is too high.
         tried = np.geomspace(1.0, least, 20).tolist()
         for above, share in itertools.pairwise(tried):
             if is_possible(share):
@@ -210,14 +211,14 @@ class _SpeedCheck:
         return None
 
     def allows(self, share: float) -> bool:
-        """Tell whether this fraction of all speeds together is possible."""
+        """Tell whether this fraction is possible for all speeds together."""
         return self.is_possible(np.full(len(self.speeds), share))
 
 
 def _largest_share(
     is_possible: Callable[[float], bool], low: float, high: float
 ) -> float:
-    """Find the largest possible fraction between one that is possible and one that is not."""
+    """Find the largest possible fraction between a fraction that is possible and one that is not."""
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_possible(middle) else (low, middle)
@@ -252,7 +253,7 @@ def explain_speeds(
         if q is None:
             return None
         check = _SpeedCheck(guess, speeds, s, q)
-        # The phase plane is exact if there are no other joint paths, and no friction that helps to brake.
+        # The phase plane is exact if there are no other joint paths, and no friction helps to brake.
         is_exact = not check.is_redundant and not has_friction
         enough = 1.0 if are_tried else (_EXACT if is_exact else _UNLIKELY)
         if not check.allows(_LEAST) or check.allows(enough):
@@ -286,7 +287,7 @@ def _explain(check: _SpeedCheck, share: float) -> PlanningError:
         shares = lower or dict.fromkeys(shares, _REACHED * share)
 
         def reach(leg: int) -> float:
-            """Return the largest fraction of the speeds between which a leg can lead."""
+            """Return the largest fraction of its end speeds that a leg allows."""
             return _largest_share(
                 lambda trial: check.pass_leg(leg, trial * every) is not None, share, 1.0
             )

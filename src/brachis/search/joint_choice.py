@@ -1,8 +1,8 @@
-"""The choice of single joints that take the place of a chart's rows.
+"""The choice of single joints whose positions take the place of a chart's rows.
 
 At the optimum any rows that are transversal along the motion describe the same motions. But splines of their
-coordinates are different curves: over the same knots, one measure of self-motion may give a motion that is a few parts
-in a thousand faster than another. So several choices of single joints are tried, and the best one is kept.
+coordinates are different curves: over the same knots, one measure of self-motion may give a motion that is a few tenths
+of a percent faster than with another measure. So several choices of single joints are tried, and the best one is kept.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from brachis.optimise.transcription import maps_by_leg, program_over
 from brachis.problem.problem import Problem
 
 SELECTABLE = 0.05
-"""Least transversality, along the motion, of joints that may take the place of the chart's rows."""
+"""Minimum transversality, along the motion, of joints that may take the place of the chart's rows."""
 
 
 def best_of_joints(
@@ -52,7 +52,7 @@ def best_of_joints(
 
 
 def _go_to(point: tuple[Program, np.ndarray]) -> Change:
-    """Return the change to a program and a point, regardless of what was kept so far."""
+    """Return the change to a program and a point, regardless of the motion that was kept so far."""
     return lambda _fastest: point
 
 

@@ -1,4 +1,4 @@
-"""Joint paths, the choice of distinct ones, and the reasons why a lattice has none."""
+"""Joint paths, the choice of distinct joint paths, and the reasons why a lattice has no joint path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_CHART = "the arm stays too close to a singularity"
 JUMPS = "no neighbouring posture continues the joint path"
 NO_TIME = "the time was up"
 _TRIES = 1000
-"""Number of random postures from which Newton's method begins before a target counts as out of reach."""
+"""Number of random postures from which Newton's method is tried before a target counts as out of reach."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class DeadEnd:
     s : float
         Path coordinate of the first station that no node reaches.
     cause : str
-        Why the lattice ends there: the cause for those of the impossible edges that came closest to being possible.
+        Why the lattice ends there: the cause for the impossible edges that came closest to being possible.
     backwards : bool
         Whether the lattice begins at the given end posture.
     """
@@ -85,10 +85,10 @@ class DeadEnd:
 
 
 def distinct(joint_paths: Sequence[PosturePath], count: int) -> list[int]:
-    """Choose up to `count` joint paths: the shortest one, and others far from those already chosen.
+    """Choose up to `count` joint paths: the shortest one, and others that are far from the joint paths already chosen.
 
-    The next choice is the joint path with the largest ratio of its distance from those already chosen to its length.
-    The distance to another branch is infinite.
+    Each further choice is the joint path with the largest ratio of its distance from the chosen ones to its length. The
+    distance to another branch is infinite.
 
     Parameters
     ----------
@@ -135,9 +135,9 @@ def weights_near(robot: Robot, limits: Sequence[Limit], q: np.ndarray) -> np.nda
 def sampling_box(
     robot: Robot, near: np.ndarray | float = 0.0, opened: Sequence[int] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the box, (n,) and (n,), from which postures are drawn: the ranges, or a turn, or 10 m around `near`.
+    """Return the box, (n,) and (n,), from which postures are drawn: ranges, or one turn, or 10 m around `near`.
 
-    The posture `near` counts for prismatic joints. The joints `opened` are treated as if they had no range.
+    The posture `near` is used only for prismatic joints. The joints `opened` are treated as if they had no range.
     """
     limits = robot.limits
     is_open = np.isin(np.arange(robot.n), opened)
@@ -153,7 +153,7 @@ def sampling_box(
 
 
 def reaches(problem: Problem, s: float) -> bool:
-    """Tell whether Newton's method finds a posture at a path coordinate from any of many random ones."""
+    """Tell whether Newton's method, begun at many random postures, finds a posture at a path coordinate."""
     low, high = sampling_box(problem.robot)
     drawn = np.random.default_rng(0).uniform(low, high, (_TRIES, problem.robot.n))
     targets = np.repeat(problem.path.sample([s]).target, _TRIES, axis=0)
@@ -164,7 +164,7 @@ def reaches(problem: Problem, s: float) -> bool:
 def least_excess(limit: Limit, q: np.ndarray) -> tuple[float, int, str]:
     """Find by how much a limit is exceeded at rest on the best of K ways through L postures, (K, L, n).
 
-    Return the largest violation on this way, its column, and in words the figure there and the allowed one.
+    Return the largest violation on this way, its column, and a text with the figure there and the allowed figure.
     """
     values = limit.values(Moments.at_rest(q.reshape(-1, q.shape[-1])))
     values = values.reshape(*q.shape[:2], -1)

@@ -1,7 +1,7 @@
 """The lattice: joint paths along the path, by dynamic programming over postures.
 
 The path is cut into stations. The nodes of a layer are postures that meet the target at its station. Layer by layer
-from the given start, they are joined to postures at the next station that are close, within the joint ranges, and
+from the given start, nodes are joined to postures at the next station that are close, within the joint ranges, and
 allowed at rest (within the torque limits, the arm can be held against gravity). Of all edges into a node, the one with
 the least total length is kept. If the end posture is given and the start is not, the layers run backwards from the end.
 `ClosedFormLattice` takes its nodes from the closed form of one choice of redundant joints, `PostureLattice` from
@@ -48,9 +48,9 @@ from brachis.search.joint_path import (
 from brachis.search.stations import stations
 
 LARGEST_STEP = 0.8
-"""Largest step of a joint between stations, rad or m."""
+"""Maximum step of a joint between stations, rad or m."""
 _HOMEWARD = 0.6
-"""Fraction of the largest step that joints may need per station to reach a given end."""
+"""Fraction of the maximum step that joints may need per station to reach a given end."""
 _LOOKS = 9
 """Number of postures examined along a step to name what is in the way."""
 _OTHER_WAYS = 3
@@ -66,7 +66,8 @@ class Layer:
     Attributes
     ----------
     branch : (K,) int ndarray
-        Label that a joint path keeps: an index into the closed form's branches, or the number of its beginning.
+        Label that is the same all along a joint path: an index into the closed form's branches, or the label of its
+        start node.
     q : (K, n) ndarray
         Postures, rad or m, continuous along the joint paths to the nodes.
     low, high : (K, n) ndarray
@@ -74,7 +75,7 @@ class Layer:
     length : (K,) ndarray
         Length of the shortest joint path to the node.
     parent : (K,) int ndarray
-        The node in the layer before from which this joint path comes.
+        The node in the previous layer from which this joint path comes.
     """
 
     branch: np.ndarray
@@ -118,11 +119,11 @@ class Edges:
     Attributes
     ----------
     parent : (E,) int ndarray
-        Node in the layer before.
+        Node in the previous layer.
     step : (E, n) ndarray
         Step from the node to the posture; NaN if the posture does not exist.
     key : (E, k) int ndarray
-        Key that is equal for edges to the same node.
+        Key that identifies the node to which an edge leads.
     elsewhere : (E,) bool ndarray, optional
         Whether there is a posture on any branch; by default there is.
     allowed : (E,) bool ndarray, optional
@@ -160,7 +161,7 @@ class Lattice(ABC):
     nodes : int, optional
         Number of nodes that a layer keeps if several joints are redundant.
     deadline : Deadline, optional
-        No layer is begun after it.
+        No layer is begun after this time.
     """
 
     def __init__(
@@ -195,7 +196,7 @@ class Lattice(ABC):
     _given_branch: int = 0
     """Branch of the given start or end posture."""
     _modulo: np.ndarray
-    """Joints, (n,) bool, whose steps are taken modulo 2 pi."""
+    """Joints, (n,) bool, whose steps are computed modulo 2 pi."""
 
     @abstractmethod
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
@@ -223,7 +224,7 @@ class Lattice(ABC):
         Parameters
         ----------
         count : int
-            Largest number of joint paths.
+            Maximum number of joint paths.
 
         Returns
         -------
@@ -317,7 +318,7 @@ class Lattice(ABC):
         return self._keep(self._in_reach(layer[chosen], station), self._thin)
 
     def _in_reach(self, layer: Layer, station: int) -> Layer:
-        """Leave out nodes that are too far from a given end for the remaining stations, unless all are."""
+        """Leave out nodes that are too far from a given end for the remaining stations, unless all of them are."""
         if not self._to_end:
             return layer
         stations_to_end = len(self.s) - 1 - station
@@ -409,7 +410,7 @@ class Lattice(ABC):
         return [joint_paths[i] for i in distinct(joint_paths, count)]
 
     def _turn_of(self, nodes: Layer) -> np.ndarray:
-        """Return multiples of 2 pi, (E, n), that bring joint paths into the ranges, to the middle of closed ones."""
+        """Return multiples of 2 pi, (E, n), that bring joint paths into the ranges, near the middle of closed ones."""
         first, last = self._turns_within(nodes.low, nodes.high)
         with np.errstate(invalid="ignore"):  # inf - inf
             middle = 0.5 * (self._lower + self._upper - nodes.low - nodes.high) / TURN

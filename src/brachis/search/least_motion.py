@@ -1,8 +1,8 @@
 """The smoothest motion among those that are as fast as the fastest one.
 
-Where the end time leaves freedom (a tool that may roll, joints far from their limits), many motions are time-optimal,
-and the solver may return one that swings light joints to and fro. A second solve from this motion, over the same knots
-and within the same limits,
+Where the shortest end time leaves freedom (a tool that may roll, joints far from their limits), many motions are
+time-optimal, and the solver may return one that swings light joints to and fro. A second solve from this motion, over
+the same knots and within the same limits,
 
     minimises   the mean of sum_i (weights_i qddot_i)^2    subject to    t_E <= (1 + slower) t_E of the fastest
 
@@ -44,7 +44,7 @@ from brachis.verify import Verification
 _KEPT_BACK = 0.1 * tolerances.END_TIME
 """Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
-"""A motion replaces the fastest one if its accelerations are lower by this fraction, or more."""
+"""A motion replaces the fastest one if its accelerations are lower by at least this fraction."""
 _MANY = 200
 """Number of variables above which an iteration of an active-set method takes tenths of a second, or seconds. No
 smoother motion that is as fast is then sought."""
@@ -72,7 +72,7 @@ class LeastMotion(Summary):
     reduction : float
         Fraction by which the root mean square of the joint accelerations is lower; 0 if the fastest motion is kept.
     later : float
-        Fraction by which the end time is longer.
+        Fraction by which the end time is later than the end time of the fastest motion.
     status : str
         Outcome in plain words.
     reports : tuple of SolverReport
@@ -133,7 +133,7 @@ def _solve(
     elif deadline.passed:
         status = "no time was left"
     elif count > _MANY and not task.search.slower:
-        status = f"the fastest motion is kept: with {count} variables no smoother one is looked for"
+        status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
     if status:
         return _keep(fastest, status)
     slower = max(task.search.slower, tolerances.END_TIME)
@@ -173,7 +173,7 @@ def _solve(
 
 
 def _reason(report: SolverReport) -> str:
-    """Say why a solve found no smoother motion; the advice in its status is meant for other solves."""
+    """Say why a solve found no smoother motion; the advice in the solver's status does not apply here."""
     if report.status is SolveStatus.TIME_LIMIT:
         return "time ran out before a smoother one was found"
     if report.status in (SolveStatus.EVALUATION_ERROR, SolveStatus.FAILED):
@@ -195,9 +195,9 @@ def least_acceleration(
 ) -> LeastAcceleration:
     """Return the objective that is 1 at x, (v,), and lets phases last longer by a fraction of up to `slower`.
 
-    Every joint's acceleration is measured relative to the joint's largest velocity. This is the velocity limit or,
-    without one, the largest velocity at x of all joints with the same unit and without such a limit. Joints without any
-    limit, such as the virtual roll of a tool, do not count.
+    Every joint's acceleration is measured relative to the joint's largest velocity. This is the velocity limit or, if
+    there is none, the largest velocity at x of all joints with the same unit and without such a limit. Joints without
+    any limit, such as the virtual roll of a tool, do not count.
     """
     robot = program.phases[0].joint_map.robot
     states = program.states(x)

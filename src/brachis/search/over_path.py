@@ -1,9 +1,9 @@
 """Improve guesses over the path: optimise each joint path together with its timing, in a chart around it.
 
-This takes tenths of a second. The result ranks guesses. If the phase plane knows all limits, it is the plan except for
-the splines. The lattice's joint path may be far from the closest local optimum. A chart is valid around its own joint
-path. If its rows lose transversality along the better joint path, or if its margin holds the motion back, a new chart
-is laid around the better joint path, and the search continues in it.
+This takes tenths of a second. The result is used to rank guesses. If the phase plane covers all limits, the result is
+the plan except for the splines. The lattice's joint path may be far from the closest local optimum. A chart is valid
+around its own joint path. If its rows lose transversality along the better joint path, or if its margin holds the
+motion back, a new chart is laid around the better joint path, and the search continues in it.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ from brachis.search.stages import (
 from brachis.search.verified import verify
 
 CHARTS = 4
-"""Largest number of charts in which a guess is improved, by default."""
+"""Maximum number of charts in which a guess is improved, by default."""
 _TRANSVERSAL = 0.5
 """Transversality of rows along a motion below which its chart is replaced by another."""
 
 
 _EXCESS_FACTOR = 1.2
-"""Ratio of the fraction of time by which a motion is lengthened to its violation."""
+"""Relative lengthening of a motion in time, divided by the violation of the motion."""
 _LARGEST_EXCESS = 0.1
-"""Violation from which on a motion is not lengthened."""
+"""Violation above which a motion is not lengthened."""
 _LENGTHENINGS = 4
-"""Largest number of times that a motion is verified."""
+"""Maximum number of times that a motion is verified."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,12 @@ def improve_guess(
     solve : SolverSession
     effort : PathEffort
     charts : int, optional
-        Largest number of charts in which it is sought.
+        Maximum number of charts in which a better joint path is sought.
 
     Returns
     -------
     BetterGuess
-        It has the given joint path if the limits allow no timing of it.
+        The guess keeps the given joint path if the limits allow no timing of it.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def _lay_chart(better: BetterGuess) -> InitialGuess | None:
 
 
 def follows_timing(guess: InitialGuess, program: Program) -> bool:
-    """Tell whether splines along the timing may be the plan: the phase plane knows all limits, ``intervals`` is auto.
+    """Tell whether splines along the timing may be the plan: the phase plane covers all limits, ``intervals`` is auto.
 
     Other solvers, which are fallbacks, always solve over time.
     """
@@ -203,7 +203,7 @@ def follows_timing(guess: InitialGuess, program: Program) -> bool:
 def improve_over_path(
     guess: InitialGuess, program: Program, session: SolverSession
 ) -> RankedCandidate:
-    """Improve a guess far enough that its time ranks it.
+    """Improve a guess far enough for its time to rank it.
 
     Parameters
     ----------

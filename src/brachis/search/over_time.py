@@ -36,16 +36,16 @@ from brachis.task import SplineSettings
 from brachis.timing import is_left_out
 
 _ENTRIES = 500_000
-"""Largest number of variables times rows of a program over time that improves a joint path. With more, an iteration
-takes tenths of a second."""
+"""Maximum product of the numbers of variables and rows of a program over time that improves a joint path. With a larger
+product, an iteration takes tenths of a second."""
 _ITERATIONS = 80
-"""Largest number of iterations of such a solve. From the timing, most solves take 5 to 25; one close to a singular
+"""Maximum number of iterations of such a solve. From the timing, most solves take 5 to 25; one close to a singular
 posture took 74."""
 _WIDENING = 1e-6
-"""See `SolverOptions`. Along a timing, hundreds of rows are at their bounds: a solve of 0.1 s took 4 s without
-widening."""
+"""Widening of the bounds; see `SolverOptions`. Along a timing, hundreds of rows are at their bounds, and a solve of 0.1
+s took 4 s without widening."""
 _NEARLY = 0.01
-"""Largest violation that refinement can remove, accepted if the iteration limit ends a solve."""
+"""Maximum violation that is accepted if the iteration limit ends a solve; refinement can remove it."""
 _FIRST_LOSS = 0.05
 """Fraction of the motion time that the first knots may cost, if a mesh is refined from them."""
 _FIRST_INTERVALS = 16
@@ -58,7 +58,7 @@ motions left their charts."""
 def solve_over_time(
     guess: InitialGuess, program: Program, session: SolverSession
 ) -> SolvedProgram:
-    """Solve over time, first over few knots: those that the fastest timing needs, or some of the given ones.
+    """Solve over time, first over few knots: those that the fastest timing needs, or some of the given knots.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _solve_clear_first(
 
 @dataclass(frozen=True)
 class BetterTimings:
-    """The timings of joint paths that the program over time has improved.
+    """Timings of joint paths, as far as the program over time has improved them.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class BetterTimings:
 
     @property
     def t_end(self) -> float:
-        """Time of all phases, s; infinite if one has no timing."""
+        """Time of all phases, s; infinite if a phase has no timing."""
         return least_time(self.timings)
 
     @property
@@ -213,7 +213,7 @@ def _solve_from_timings(
 ) -> SolvedProgram | None:
     """Solve over time from splines along the timings of all phases; None if that gives no motion."""
     r = program.phases[0].joint_map.r
-    # Variables times rows grow with the square of the number of intervals.
+    # The product of variables and rows grows with the square of the number of intervals.
     rows = (1 + r) * len(program.lower) / program.intervals
     intervals = int(np.sqrt(_ENTRIES / rows))
     begun = begin_with_timing(

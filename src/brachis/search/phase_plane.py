@@ -4,9 +4,9 @@ A joint path has kinks where the tool stops, so every leg of the path is timed b
 speed has only one motion, which the limits either allow or do not allow.
 
 The first guess of a leg is the fastest timing of its joint path, smoothed by splines and slowed down until no limit is
-exceeded. It is then close to the limits that hold the fastest motion back, so that a solver finds its way. If a smooth
-motion from rest to rest is faster, or if splines cannot follow the timing within the limits, this motion is the first
-guess. If splines over few knots leave the branch, the first guess goes straight from end to end.
+exceeded. It is then close to the limits that hold the fastest motion back, which helps a solver to converge. If a
+smooth motion from rest to rest is faster, or if splines cannot follow the timing within the limits, this motion is the
+first guess. If splines over few knots leave the branch, the first guess goes straight from end to end.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from brachis.timing import JointPath, PhasePlane
 _STATIONS = 401
 """Number of stations along the joint path of a guess."""
 _NEAR = 1e-4
-"""Stations closer than this to an end of a leg, in s, are left out: differences would be inaccurate."""
+"""Stations closer than this to an end of a leg, in s, are left out, because differences would be inaccurate."""
 _ROUGH = 0.99
-"""Fraction of a given speed that the limits have to allow: derivatives of a joint path are inaccurate differences."""
+"""Fraction of a given speed that the limits must allow; derivatives of a joint path are only inaccurate differences."""
 
 
 def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
@@ -46,7 +46,7 @@ def least_time(problem: Problem, s: np.ndarray, q: np.ndarray) -> float:
     Returns
     -------
     float
-        Time, s; infinite if the joint path cannot be followed at any speed, or not at the given one.
+        Time, s; infinite if the joint path cannot be followed at any speed, or not at the given speed.
     """
     total = problem.dwell_time
     for timed_leg in fastest_times(problem, s, q):
@@ -65,7 +65,7 @@ def fastest_times(
     s : (S,) ndarray
         Path coordinates, ascending from 0 to 1.
     q : (S, n) ndarray
-        Postures there, rad or m, continuous.
+        Postures at these coordinates, rad or m; the joint path is continuous.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def initial_guess(program: Program, guess: InitialGuess) -> np.ndarray | None:
     durations = guess.durations or (None,) * len(guess.legs)
     curves_and_durations = [(guess.legs, durations)]
     if guess.durations is None:
-        # The timing of a joint path that was not improved leads to different optima.
+        # The timing of a joint path that was not improved would lead to different optima.
         timed = [
             _time_guess(phase, curves)
             if guess.is_improved or any(phase.boundary.rates)

@@ -2,25 +2,25 @@
 
     joint path      from a lattice, at random, from a given motion, or from the task
     over the path   joint path and speed together                                       a better InitialGuess
-    timing          the fastest one along that joint path, by the phase plane           RankedCandidate
+    timing          the fastest timing of that joint path, by the phase plane           RankedCandidate
     over time       the program with all limits, from splines along that timing         SolvedProgram
-    knots           finer, or free ones; other coordinates over the same ones           SolvedProgram
-    refinement      collocation points where limits are exceeded between others         SolvedProgram
+    knots           finer or free knots; other coordinates over the same knots          SolvedProgram
+    refinement      more collocation points where limits are exceeded between them      SolvedProgram
     verification    from URDF, path and limits alone                                    FinishedCandidate
 
 `rank_candidate` goes as far as the timing, whose duration, `Candidate.estimate`, ranks the candidates. Limits that the
-phase plane does not know (jerk, torque rate, means) do not affect it. `finish_candidate` continues with the candidates
-that may be the fastest, in one of two ways:
+phase plane does not cover (jerk, torque rate, means) do not affect this duration. `finish_candidate` continues with the
+candidates that may be the fastest, in one of two ways:
 
-- `_finish_over_time`, if knots are given (``intervals: 20``, or ``knots: free``), or if the phase plane does not know
+- `_finish_over_time`, if knots are given (``intervals: 20``, or ``knots: free``), or if the phase plane does not cover
   one of the limits. The solution of the program over time is refined.
-- `_finish_over_path`, for ``intervals: auto`` and limits that the phase plane knows. The program over time improves the
-  joint path. Its solution is refined if it is about as fast as the timing of its own joint path; otherwise splines are
-  laid along this timing.
+- `_finish_over_path`, for ``intervals: auto`` and limits that the phase plane covers. The program over time improves
+  the joint path. Its solution is refined if it is about as fast as the timing of its own joint path; otherwise splines
+  are laid along this timing.
 
 The coordinates are those of a closed form if the task names its redundant joints. Otherwise they are those of a chart,
-which measures self-motion around a joint path. A path of joints leaves nothing to improve: it is timed, and splines are
-laid along the timing.
+which measures self-motion around a joint path. A prescribed joint path leaves nothing to improve: it is timed, and
+splines are laid along the timing.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ from brachis.search.verified import refine_and_verify
 _BEFORE_REFINEMENT = 0.5
 """Fraction of the remaining time for everything before refinement."""
 _IF_SHORT = 0.2
-"""The same fraction if there is little time and splines are laid, which takes half a second. With 0.5 they were laid
-too late."""
+"""The same fraction if there is little time and splines are laid, which takes half a second. With 0.5, splines were
+laid too late."""
 
 
 def rank_candidate(
@@ -85,7 +85,7 @@ def rank_candidate(
     """
     if deadline.passed:
         return begin_candidate(guess, NOT_TRIED)
-    # A given motion is the first point of the program over time, if this program gives the solution.
+    # A given motion is the first point of the program over time if this program gives the final solution.
     is_motion = guess.durations is not None
     has_given_knots = guess.problem.task.spline.intervals != "auto"
     try:
@@ -114,7 +114,7 @@ def finish_candidate(
     Returns
     -------
     Candidate
-        A finished candidate if there is a motion.
+        A `FinishedCandidate` if a motion was found.
     """
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
@@ -147,7 +147,7 @@ def _finish_over_time(
     if not solved.usable:
         words = solved.report.status.name.lower().replace("_", " ")
         return fail(candidate, words, solved.reports)
-    # A program over many knots is reached from one over few.
+    # A program over many knots is solved from the solution over few knots.
     target = solved.program if spline.intervals == "auto" else program
     has_given_knots = spline.intervals != "auto" and spline.knots != "free"
     has_all_knots = solved.program.intervals == target.intervals
@@ -179,7 +179,7 @@ def _finish_over_path(
     options: RefinementOptions,
     to_beat: Marks,
 ) -> Candidate:
-    """Improve joint paths further over the path, then over time, and follow the timing of the faster one.
+    """Improve joint paths further over the path, then over time, and follow the faster of the two timings.
 
     The joint path that the program over time improves is kept. The time that its knots cost is regained by splines that
     are laid along the timing.
@@ -246,7 +246,7 @@ def _refine(
 def _open_session(
     guess: InitialGuess, deadline: Deadline, listener: Listener
 ) -> SolverSession:
-    """Open a session of the guess's solver under the task's bounds."""
+    """Open a session of the guess's solver with the solver settings of the task."""
     (backend,) = solvers_for(guess.solver)
     problem = guess.problem
     return SolverSession.for_task(

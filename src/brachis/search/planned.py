@@ -1,4 +1,4 @@
-"""The data of a plan's result: the trajectory, its verification, and how they were found; methods are in `result`."""
+"""The data of a plan's result: the trajectory, its verification, and how they were found. Methods are in `result`."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class PlannedMotion(Summary):
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """The time that limits and other demands of the task cost, from the multipliers of the plan."""
+        """The time that limits and other demands of the task cost, computed from the multipliers of the plan."""
         candidate = self.candidate
         with use_one_thread():
             return explain_motion(

@@ -56,20 +56,20 @@ from brachis.search.stages import (
 from brachis.trajectory import Trajectory
 
 _LEAST_COST = 0.5
-"""Knots, and limits that the phase plane does not know, lengthen every motion. They cost a candidate at least this
-fraction of the smallest cost so far. With 10 intervals, joint paths of a planar arm lost 17 to 20 % of the time."""
+"""Knots, and limits that the phase plane does not cover, lengthen every motion. They cost a candidate at least this
+fraction of the smallest cost so far. With 10 intervals, motions of a planar arm became 17 to 20 % longer."""
 _RANKING_SHARE = 0.6
 """Fraction of the remaining time after which no joint path is improved while nothing is verified."""
 _RESERVE = 0.3
 """Fraction of the time that is reserved for a first motion while nothing is verified."""
 _LONGEST_RESERVE = 10.0
-"""Longest such reserve, s: for a weld, a first motion takes 3 s, and three times as long on a busy machine."""
+"""Maximum of this reserve, s: for a weld, a first motion takes 3 s, and three times as long on a busy machine."""
 _FIRST_SHARE = 0.6
 """Fraction of the remaining time in which a first motion is sought before anything else."""
 _LATER = 0.2
 """Time, s, for which the search continues after its deadline if no first motion was found."""
 _REFINED = 5e-3
-"""Fraction of the end time that refinement usually adds at most; if it adds more, another motion may be faster."""
+"""Fraction of the end time that refinement usually adds at most. If it adds more, another motion may be faster."""
 
 
 class Search:
@@ -91,7 +91,7 @@ class Search:
     guesses : list of InitialGuess
         All guesses from which candidates were begun.
     best : FinishedCandidate or None
-        The fastest verified candidate; without one, the candidate closest to the limits.
+        The fastest verified candidate; if none is verified, the candidate closest to the limits.
     interrupted : bool
         Whether Ctrl-C or the time limit ended the search.
     """
@@ -153,10 +153,10 @@ class Search:
         motion : Trajectory, optional
             A motion that is tried first. If it leads to a verified motion, nothing else is tried.
         exact : FinishedCandidate, optional
-            A verified plan of the same task without tolerances. It is the plan unless a faster one is found. The search
-            looks close to it first, and elsewhere only if it found nothing there or is exhaustive.
+            A verified plan of the same task without tolerances. It is the result unless a faster plan is found. The
+            search looks close to this plan first, and elsewhere only if it found nothing there or is exhaustive.
         max_batches : int, optional
-            Largest number of batches.
+            Maximum number of batches.
 
         Raises
         ------
@@ -330,7 +330,7 @@ class Search:
             failure = failure or explain_speeds(self.guesses, are_tried=True)
         if failure is not None:
             return failure
-        # The time limit of the search may have ended every solve before its own time limit.
+        # The time limit of the search may have ended every solve before the solve's own time limit.
         last = [
             candidate.reports[-1] for candidate in self.candidates if candidate.reports
         ]
@@ -394,7 +394,7 @@ class Search:
         return self.is_satisfied or self._first_motion is not None
 
     def _by_time(self, first: int = 0) -> list[int]:
-        """Return the numbers, from `first` on, of the ranked candidates, by the times along their joint paths."""
+        """Return the numbers of ranked candidates, from `first` on, by the times along their joint paths."""
         return sorted(
             (number for number in self._ranked if number >= first),
             key=lambda number: (round_end_time(self._ranked[number].estimate), number),
@@ -458,7 +458,7 @@ class Search:
         return is_fast and not self._is_known(candidate)
 
     def _keep(self, candidate: FinishedCandidate) -> None:
-        """Make a candidate the best one; once it is verified, others have to beat it over the same knots."""
+        """Make a candidate the best one; once it is verified, other candidates have to beat it over the same knots."""
         self.best = candidate
         if self.is_satisfied:
             is_patient = self._problem.task.search.effort == "exhaustive"

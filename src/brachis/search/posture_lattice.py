@@ -2,12 +2,12 @@
 
 At every node, the ranges of the r joints that move most in the arm's self-motion there are cut into cells. Newton's
 method finds the postures in the surrounding cells at the next station. So every posture that a continuous motion
-reaches from the nodes before is found, at the spacing of the cells, and no boundary of a closed form's branch ends the
-search. If neither end is given, the first layer comes from all available closed forms, which cover the whole
-self-motion manifold. For arms without a closed form, it comes from random postures. Two postures are joined if no joint
-moves far and the step is along the self-motion: apart from what the next target requires of the joints, most of the
-step lies in the null space of the Jacobian. With several redundant joints, cells are sampled, and a layer keeps a
-bounded number of nodes.
+reaches from the previous nodes is found, at the spacing of the cells, and no boundary of a closed form's branch ends
+the search. If neither end is given, the first layer comes from all available closed forms, which cover the whole
+self-motion manifold. For arms without a closed form, the first layer comes from random postures. Two postures are
+joined if no joint moves far and the step is along the self-motion: apart from what the next target requires of the
+joints, most of the step lies in the null space of the Jacobian. With several redundant joints, cells are sampled, and a
+layer keeps a bounded number of nodes.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class PostureLattice(Lattice):
     def _choose(
         self, joint_paths: list[PosturePath], ends: Layer, count: int
     ) -> list[PosturePath]:
-        """Choose joint paths no longer than those to neighbouring nodes, then some that differ; name their seeds.
+        """Choose joint paths no longer than the ones to neighbouring nodes, then different ones; name their seeds.
 
         With several redundant joints, the nodes are samples, which have no such minima.
         """
@@ -104,7 +104,7 @@ class PostureLattice(Lattice):
         ]
 
     def _start_nodes(self, rng: np.random.Generator) -> Layer:
-        """Create nodes all over the self-motion manifold at the path's beginning, one in each cell."""
+        """Create nodes spread over the self-motion manifold at the start of the path, one in each cell."""
         target = self._targets[:1]
         count = 4 * self._nodes
         seeds = []
@@ -136,8 +136,8 @@ class PostureLattice(Lattice):
     def _choose_start_nodes(self, layer: Layer) -> Layer:
         """Label the start nodes; joint paths with different labels do not displace each other.
 
-        With one redundant joint, each connected component of the self-motion manifold has a label. With several, a few
-        postures far from each other have one label each.
+        With one redundant joint, each connected component of the self-motion manifold has a label. With several
+        redundant joints, a few postures that are far apart have one label each.
         """
         q = layer.q
         if self._r > 1:
@@ -152,7 +152,7 @@ class PostureLattice(Lattice):
         return Layer.start(q, connected_components(graph, directed=False)[1])
 
     def _key(self, q: np.ndarray, size: np.ndarray | float) -> np.ndarray:
-        """Round postures, without turns that do not count, to integer multiples, (K, n), of a spacing."""
+        """Round postures to integer multiples, (K, n), of a spacing, after removal of turns that do not count."""
         return np.rint(self._without_turns(q) / size).astype(int)
 
     def _without_turns(self, q: np.ndarray) -> np.ndarray:

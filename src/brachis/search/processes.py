@@ -1,4 +1,4 @@
-"""Work shared between this process and others.
+"""Work shared between this process and other processes.
 
 This process works while the others start, and waits only when all work is handed out.
 """
@@ -23,13 +23,13 @@ from brachis.errors import BrachisError
 
 _MAIN = "MainProcess"
 _WORTH_STARTING = 3.0
-"""Remaining work, s, for which other processes are started; starting takes a second or two."""
+"""Minimum remaining work, s, for which other processes are started; starting them takes a second or two."""
 _WORTH_SENDING = 0.7
-"""Remaining work, s, that is handed out to processes that were started before."""
+"""Minimum remaining work, s, for which work is handed out to processes that were started earlier."""
 _IDLE_TIME = 300.0
 """Time, s, after which a process without work ends."""
 _HEARTBEAT = 0.1
-"""Longest time, s, until Ctrl-C is noticed."""
+"""Maximum time, s, until Ctrl-C is noticed."""
 
 _Input = TypeVar("_Input")
 _Output = TypeVar("_Output")
@@ -42,7 +42,7 @@ def run_in_processes(
     jobs: int | str,
     listener: Listener,
 ) -> Generator[_Output, None, None]:
-    """Call a function with every argument, in up to `jobs` processes.
+    """Call a function once for each argument, in up to `jobs` processes.
 
     Work that was handed out is completed even if its result is no longer wanted.
 
@@ -56,9 +56,9 @@ def run_in_processes(
     *shared_arguments : object
         Further arguments, the same for all calls.
     jobs : int or "auto"
-        With 1, and within the workers of another program, the work is done in this process, call by call as results are
-        asked for. With ``auto`` this is also the case until the remaining work is expected to take longer than 3 s, or
-        0.7 s if an earlier plan has started the processes. Work that cannot be sent to other processes is done here
+        With 1, or inside a worker of another program, the work is done in this process, one call at a time, as results
+        are requested. With ``auto`` this is also the case until the remaining work is expected to take longer than 3 s,
+        or 0.7 s if an earlier plan has started the processes. Work that cannot be sent to other processes is done here
         too.
     listener : callable
         Called only for work that is done in this process.
@@ -112,7 +112,7 @@ def _hand_out(
     function: Callable[..., _Output],
     *shared_arguments: object,
 ) -> list[Future[_Output]]:
-    """Hand out the first arguments to `count` processes, as many as they are free for, but no more than their share."""
+    """Hand out the first arguments to `count` processes: as many as they can take, but no more than their share."""
     workers = _start_workers(count, os.getpid())
     share = len(waiting) * count // (count + 1)
     quota = min(share, workers.count_free())
@@ -211,7 +211,7 @@ def _run_in_worker(function: Callable[..., _Output], *arguments: object) -> _Out
 
 
 def _is_within_a_worker() -> bool:
-    """Tell whether this process is itself a worker: workers that start workers would multiply."""
+    """Tell whether this process is itself a worker; workers that started workers would multiply."""
     from joblib.parallel import get_active_backend
 
     return (

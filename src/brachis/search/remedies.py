@@ -1,4 +1,4 @@
-"""Advice with numbers: a number is advised only after a plan with it was verified."""
+"""Advice with numbers: a number is advised only after a plan with this number was verified."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from brachis.search.portfolio import Search
 from brachis.task import Task, load_task, task_with, with_keys
 
 _TIME = 20.0
-"""Time for all numbers of one error, s."""
+"""Maximum time for testing all numbers of one error, s."""
 _TRIALS = 10
-"""Largest number of trials of one number."""
+"""Maximum number of trials of one number."""
 _NEAR = 1.04
-"""The search ends when the smallest change that is enough is known up to this factor."""
+"""The search ends when the smallest change that is enough is known to within this factor."""
 
 
 def try_remedies(
@@ -46,7 +46,7 @@ def try_remedies(
     families, own_limits : sequence
         As for `brachis.plan`.
     deadline : Deadline
-        After it, the hint names what to change, but not by how much.
+        After this time, the hint names what to change, but not by how much.
     """
     if not error.remedies:
         return
@@ -113,7 +113,8 @@ def is_planned(
 
 
 IsEnough = Callable[[float, int | None], bool | None]
-"""Tells whether a number is enough, from a number of batches of the search (None: all); None if a plan may exist."""
+"""Function that tells whether a number is enough, from a number of search batches (None: all). None: a plan may
+exist."""
 
 
 def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str:
@@ -122,7 +123,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
     if good is None:
         return ""
     verified = "(a plan with it was verified"
-    # Quick trials may miss a plan, so the message says that none was found only after a complete search.
+    # Quick trials may miss a plan, so the message says only after a complete search that no plan was found.
     if bad != remedy.current and not deadline.passed:
         outcome = is_enough(bad, None)
         if outcome:
@@ -135,7 +136,7 @@ def _try_numbers(remedy: Remedy, is_enough: IsEnough, deadline: Deadline) -> str
 def _bracket(
     remedy: Remedy, is_enough: IsEnough, deadline: Deadline
 ) -> tuple[float | None, float]:
-    """Find the smallest change known to be enough (None if there is none), and the largest one that is not."""
+    """Find the smallest change known to be enough (None if there is none), and the largest change that is not."""
     # Numbers are rounded towards the larger change.
     lowers = remedy.guess < remedy.current
     away = -1.0 if lowers else 1.0

@@ -2,7 +2,7 @@
 
 If the task leaves the choice of redundant joints open, guesses come from the lattice of all postures, and plans are
 made in charts; the closed forms of single choices are tried only while nothing is verified. If the task names its
-redundant joints or its branch, only these are tried. Along a path of joints there is only one guess.
+redundant joints or its branch, only these choices are tried. Along a prescribed joint path there is only one guess.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from brachis.search.stages import InitialGuess
 _SIZE = 12
 """Number of guesses in a batch."""
 _LATTICE_SHARE = 0.4
-"""Fraction of the remaining time in which the guesses of a level are sought; those found by then are tried."""
+"""Fraction of the remaining time in which the guesses of a level are sought; the guesses found by then are tried."""
 
 Lattices = list[tuple[Decomposition | None, DeadEnd]]
 """Lattices that gave no guesses (None for the lattice of all postures), and where they end."""
@@ -50,7 +50,7 @@ class Batch:
     guesses : sequence of InitialGuess
         Guesses, each with the solver that plans from it.
     refined : int
-        Largest number of candidates that are refined and verified once a motion is verified.
+        Maximum number of candidates that are refined and verified once a motion is verified.
     fallback : bool
         Whether the batch is tried only while no motion is verified.
     lattices : list of (Decomposition or None, DeadEnd)
@@ -124,7 +124,7 @@ def batches(
 
 
 def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> bool:
-    """Tell whether motions are planned in charts: the task leaves the joints open, and the robot is redundant."""
+    """Tell whether motions are planned in charts: the choice of joints is open, and the robot is redundant."""
     task = problem.task
     is_open = task.redundant_joints == task.branch == "auto"
     if not is_open or task.search.guesses != "lattice":
@@ -197,7 +197,7 @@ def _guess_on_some_branches(
     listener: Listener,
     level: SearchLevel,
 ) -> GuessesAndLattices:
-    """Take a guess from every decomposition in turn; each gives its guesses with the least estimated times first."""
+    """Take a guess from every decomposition in turn; each gives the guesses with the least estimated times first."""
     search = decompositions[0].problem.task.search
     if search.guesses == "numeric":
         count = level.joint_paths

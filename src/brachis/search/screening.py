@@ -2,7 +2,7 @@
 
 If several joints are redundant, the length of a joint path and the least time along it say little about the motion that
 an optimiser finds from it. A rough optimisation over the path says more and costs little. The plan then begins with the
-joint path at which it ended.
+joint path at which the rough optimisation ended.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from brachis.search.stages import InitialGuess
 _NEAR_LEAST = 1.01
 """Factor on the least time up to which guesses count as equally fast."""
 _SAME_TIME = 0.02
-"""Largest relative difference between estimates of the same joint path."""
+"""Maximum relative difference between estimates of the same joint path."""
 _SAME_POSTURE = 0.15
-"""Largest distance between joints along the same joint path, rad or m."""
+"""Maximum difference of a joint position along joint paths that count as the same, rad or m."""
 _FEWEST = 2
 """Minimum number of guesses that are kept, however little of the time is free."""
 _MOST = 8
-"""Largest number of guesses that are improved for each one that is kept: four from a lattice, and four at random."""
+"""Maximum number of guesses that are improved for each guess that is kept: four from a lattice, and four at random."""
 _PLACES = np.linspace(0.0, 1.0, 49)
 """Path coordinates at which joint paths are compared."""
 
@@ -76,7 +76,7 @@ def _count_worthwhile(count: int, guesses: Sequence[InitialGuess]) -> int:
 
 
 def _free_share(guesses: Sequence[InitialGuess]) -> float:
-    """Return the fraction of the least time that the task does not fix: no more can be gained."""
+    """Return the fraction of the least time that the task does not fix, which is the most that can be gained."""
     problem = guesses[0].problem
     durations = [law.duration for law in problem.time_laws if law is not None]
     fixed_time = sum(durations) + problem.dwell_time
@@ -85,7 +85,7 @@ def _free_share(guesses: Sequence[InitialGuess]) -> float:
 
 
 def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[InitialGuess]:
-    """Choose the fastest guesses, one for each joint path; those without a time count only if none has one."""
+    """Choose the fastest guesses, one for each joint path; guesses without a time count only if no guess has one."""
     timed = [guess for guess in guesses if np.isfinite(guess.estimate)]
     chosen: list[InitialGuess] = []
     for guess in sorted(timed or guesses, key=lambda guess: guess.estimate):
@@ -95,7 +95,7 @@ def _choose_distinct(guesses: Sequence[InitialGuess], count: int) -> list[Initia
 
 
 def _spread_out(guesses: Sequence[InitialGuess]) -> list[InitialGuess]:
-    """Order guesses so that each differs most from all before it; of equal guesses only the first is kept.
+    """Order guesses so that each differs most from all earlier guesses; of equal guesses, only the first one is kept.
 
     Guesses close to each other end in the same optimum. If guesses that are far apart do so, the others do too. Guesses
     without some of their postures come last.
@@ -120,7 +120,7 @@ def _improve_in_parallel(
     deadline: Deadline,
     listener: Listener,
 ) -> list[InitialGuess]:
-    """Improve guesses until, for each one kept, `spare` end close to the least time: others are hardly faster."""
+    """Improve guesses until, for each one kept, `spare` end close to the least time: more are hardly faster."""
     work = run_in_processes(
         improve_quickly,
         guesses,
@@ -152,7 +152,7 @@ def improve_quickly(
     charts: int,
     _listener: Listener,
 ) -> InitialGuess:
-    """Improve a guess over the path. If that fails, an improved guess keeps its estimate, any other gets infinity."""
+    """Improve a guess over the path; if that fails, keep the estimate of an improved one, else set it to infinity."""
     if not guess.is_improved:
         guess = replace(guess, estimate=np.inf)
     if deadline.passed:

@@ -1,8 +1,8 @@
-"""The stages of a search, with a frozen type each: initial guess, candidate, ranked candidate, finished candidate.
+"""The stages of a search, each with a frozen type: initial guess, candidate, ranked candidate, finished candidate.
 
-An `InitialGuess` is a joint path. Every attempt to plan from it is a `Candidate`, even if it fails. A candidate whose
-joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then verified, whether it
-passed or not, is a `FinishedCandidate`.
+An `InitialGuess` is a joint path. Every attempt to plan from a guess is a `Candidate`, even if the attempt fails. A
+candidate whose joint path was improved is a `RankedCandidate`. A candidate with a motion that was refined and then
+checked by the verification, whether it passed or not, is a `FinishedCandidate`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SearchMap = ClosedFormMap | ChartMap | JointSpaceMap
 
 
 def coordinates(redundant_joints: Sequence[str], branch: str) -> str:
-    """Name the coordinates, besides s, in which a motion is planned: redundant joints, those of a chart, or none."""
+    """Name the coordinates, besides s, of a planned motion: redundant joints, coordinates of a chart, or none."""
     return ", ".join(redundant_joints) or (CHART if branch == CHART else "none")
 
 
@@ -60,12 +60,12 @@ class InitialGuess(Summary):
     family : str
         Family of the closed form; ``chart`` or ``path of joints`` without one.
     solver : str
-        The solver that plans from it; empty while none is chosen.
+        The solver that plans from the guess; empty while no solver is chosen.
     durations : tuple of float or None
         Duration of every leg, s, if the joint path's values are those of a motion: equally many for each leg, at even
-        times. None if they are not.
+        times. None otherwise.
     is_improved : bool
-        Whether the joint path is roughly a local optimum for the limits that the phase plane knows.
+        Whether the joint path is roughly a local optimum for the limits that the phase plane covers.
     """
 
     problem: Problem
@@ -132,7 +132,7 @@ class Candidate(Summary):
     status : str
         Outcome in plain words.
     begun : float
-        End time over the first knots, s; infinite if no others follow.
+        End time over the first knots, s; infinite if no other knots follow.
     adapted : float
         End time over all knots, before refinement, s; infinite if there was no such program.
     reports : tuple of SolverReport
@@ -158,7 +158,7 @@ class Candidate(Summary):
 
     @property
     def t_end(self) -> float:
-        """End time of the trajectory, s; infinite without one."""
+        """End time of the trajectory, s; infinite if there is no trajectory."""
         return np.inf
 
     @property
@@ -168,7 +168,7 @@ class Candidate(Summary):
 
     @property
     def is_settled(self) -> bool:
-        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
+        """Whether the candidate is verified, or fails only checks that the task wants to be reported, not enforced."""
         return False
 
     def describe(self) -> str:
@@ -197,7 +197,7 @@ class Candidate(Summary):
 
 @dataclass(frozen=True)
 class Marks:
-    """End times that a candidate has to beat, s; infinite while no motion is verified.
+    """End times, s, that a candidate has to beat; infinite while no motion is verified.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class Marks:
 
 
 def round_end_time(time: float) -> float:
-    """Round an end time, so that digits in which processes differ do not decide."""
+    """Round an end time, so that digits that differ between processes do not decide."""
     return float(f"{time:.6g}")
 
 
@@ -241,7 +241,7 @@ def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RankedCandidate(Candidate):
-    """A candidate whose joint path was improved over the path, if that is possible, and which may be finished.
+    """A candidate whose joint path has been improved over the path, if possible; it may be finished later.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ class RankedCandidate(Candidate):
 
     @property
     def family(self) -> str:
-        """Family of the closed form."""
+        """Name of the closed form's family."""
         return self.guess.family
 
 
@@ -293,9 +293,9 @@ class FinishedCandidate(Candidate):
     Attributes
     ----------
     problem : Problem
-        What was planned: the task, or a simpler one (see `widen_plan`).
+        The problem that was planned: that of the task, or a simpler one (see `widen_plan`).
     family : str
-        Family of the closed form.
+        Name of the closed form's family.
     refined : SolvedProgram
         The last program, and its solution.
     optimum : SolvedProgram
@@ -335,7 +335,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def is_settled(self) -> bool:
-        """Whether the candidate is verified, or fails only checks that the task wants reported and not enforced."""
+        """Whether the candidate is verified, or fails only checks that the task wants to be reported, not enforced."""
         return all(
             check.passed or not check.is_kept for check in self.verification.checks
         )
@@ -352,7 +352,7 @@ class FinishedCandidate(Candidate):
 
     @property
     def time_scaled(self) -> float:
-        """Factor by which the end time was lengthened in the last step."""
+        """Factor by which the end time was multiplied in the last step."""
         return self.refined.time_scaled
 
     @property

@@ -1,4 +1,4 @@
-"""Stations along a path, closer where it bends or the tool turns."""
+"""Stations along a path, which are closer together where the path bends or the tool turns."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _FEWEST_STEPS = 24.0
 _MOST_STEPS = 600
 """Maximum number of steps of a lattice."""
 _LONGEST_STEP = 0.05
-"""Longest step of a lattice, m, for arms up to 3.3 m long."""
+"""Maximum step of a lattice, m, for arms up to 3.3 m long."""
 _LONGEST_SHARE = 0.015
-"""Longest step for longer arms, as a fraction of their length."""
+"""Maximum step for longer arms, as a fraction of the arm's length."""
 _LARGEST_TURN = 0.25
-"""Largest turn in a step of a lattice, rad, of the direction of motion or of the tool."""
+"""Maximum turn of the direction of motion, or of the tool, in a step of a lattice, rad."""
 _PLACES = 2000
 """Approximate number of points at which a path is measured."""
 

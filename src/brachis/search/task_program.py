@@ -1,4 +1,4 @@
-"""The program of a task with an initial guess, for a solver of the user's own."""
+"""The program of a task with an initial guess, for the user's own solver."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class TaskProgram(Program):
 
     @cached_property
     def guess(self) -> np.ndarray:
-        """A first point x, (v,): splines through a joint path, slow enough for the limits that a slower motion meets.
+        """A first point x, (v,): splines through a joint path, slow enough to meet the limits that grow with speed.
 
         Raises
         ------

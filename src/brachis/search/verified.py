@@ -35,10 +35,10 @@ def refine_and_verify(
     solve: Solve,
     options: RefinementOptions,
 ) -> Candidate:
-    """Refine and verify; only verify if the time is up.
+    """Refine and verify a motion; if the time is up, only verify it.
 
     Close to a singularity, a peak may be narrower than the spacing of the refinement's grid. If only the verification
-    sees it, the motion is refined once more, on a denser grid.
+    detects such a peak, the motion is refined once more, on a denser grid.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def refine_and_verify(
         Candidate from which the program was made.
     program : Program
     reports : tuple of SolverReport
-        Reports of all solves so far; the last one is that of the program.
+        Reports of all solves so far; the last report is that of the program.
     solve : callable
         ``solve(program, x)`` returns a `SolverReport`.
     options : RefinementOptions
@@ -83,7 +83,7 @@ def verify(
     Returns
     -------
     Candidate
-        A finished candidate if there is a trajectory.
+        A `FinishedCandidate` if a trajectory was found.
     """
     problem = candidate.problem
     verification = None
@@ -127,7 +127,7 @@ def _in_words(
     if refined.violation > tolerance:
         reason = f"limits exceeded by {100.0 * refined.violation:.2g} %"
     elif verification is None:
-        reason = "too sharp for a trajectory"
+        reason = "the motion is too sharp for a trajectory"
     else:
         reason = "the verification fails"
     rounds = write_count(len(refined.reports) - 1, "refinement round")

@@ -9,7 +9,7 @@ import pytest
 from support.effort import QUICK
 
 SCARA = Path(__file__).parents[3] / "robots/scara3/robot.urdf"
-WARNING = "brachis: warning: robot.limits.scale.velocity: the factor raises limits far beyond what was stated"
+WARNING = "brachis: warning: robot.limits.scale.velocity: the factor raises limits far above the stated values"
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ WRONG_TASKS = [
     ("robot.limits.position: {j2: [-1.0, 1.0]}", "'j2'.*-2.0944 rad.*-1 rad to 1 rad"),
     ("end: {joints: [0.0, 0.0, 0.0]}", "end.joints.*off the path.*m off in"),
     ("branch: elbow_up", "'elbow_up'.*elbow_positive, elbow_negative"),
-    ("branch: elbow_positive", "another branch.*elbow_negative"),
+    ("branch: elbow_positive", "a different branch.*elbow_negative"),
     ("solver.name: slsqp", "'slsqp'.*uno.*ipopt.*uno_interior"),
     (
         "robot.urdf: scara4",

@@ -1,8 +1,8 @@
 """The task map for a task: for the tool, for a tool that may deviate from the path, or for the joints themselves.
 
 Each direction in which the tool may deviate from the path, such as a roll about its axis, is a virtual joint after the
-tool frame. A pose with one open row thus becomes a pose of six rows again, and there is one more joint that may be
-redundant. The closed forms for poses serve both cases.
+tool frame. A pose with one open row thus becomes a pose of six rows again, with one more joint that may be redundant,
+so that the closed forms for poses serve both cases.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from brachis.task import Tolerances
 class JointSpace(TaskMap):
     """All n joint positions; the Jacobian is the identity.
 
-    Whole turns count in differences, because the path prescribes the turn of each joint.
+    Differences between positions include whole turns, because the path prescribes the turn of each joint.
     """
 
     @property
@@ -72,7 +72,7 @@ JOINTS = "joints"
 
 
 def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
-    """Bind rows of a task space, or the word for them, to a robot.
+    """Bind a task space, given by its rows or by a word for them, to a robot.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
             "this task space does not exist",
             where="task_space",
             found=rows,
-            allowed=f"rows out of {', '.join(AXES)}, each once, and behind them one of {', '.join(ANGLES)}, {AXIS}; "
+            allowed=f"rows out of {', '.join(AXES)}, each once, and after them one of {', '.join(ANGLES)}, {AXIS}; "
             f"or one of position, pose, {FREE_ROLL}, {JOINTS}",
         )
     if AXIS in names:
@@ -182,7 +182,7 @@ def bind(
     joints = tool_joints_of(space, tolerances)
     if robot.tool_joints and robot.tool_joints != joints:
         raise InputError(
-            "the robot is bound to another task space or other tolerances: its tool leaves the path in other ways",
+            "the robot is bound to a different task space or tolerances: its tool leaves the path in other ways",
             where="robot",
             found=", ".join(joint.name for joint in robot.tool_joints),
             allowed=", ".join(joint.name for joint in joints) or "no virtual joints",

@@ -30,17 +30,17 @@ _JOINT: Final = "joint "
 
 
 def position_rows(rows: Sequence[str]) -> tuple[str, ...]:
-    """Return the rows whose change is the length of a path: the position, which comes first, or all joints."""
+    """Return the rows whose changes measure the length of a path: the position, which comes first, or all joints."""
     return tuple(row for row in rows if row not in {*ANGLES, *TURN_ROWS, AXIS})
 
 
 def joint_rows(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the rows of a space of joints with these names; no other row has such a name."""
+    """Return the rows of a joint space with these joint names; no other row has such a name."""
     return tuple(_JOINT + name for name in names)
 
 
 def joints_of(rows: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the joints whose space has these rows; none for the space of a tool."""
+    """Return the names of the joints whose joint space has these rows; empty if the rows are of the tool."""
     return tuple(row.removeprefix(_JOINT) for row in rows if row.startswith(_JOINT))
 
 
@@ -53,7 +53,7 @@ class TaskDerivatives:
     velocity_q : (K, m, n) ndarray
         V_q = d(J qdot)/dq.
     acceleration_q, acceleration_qdot : (K, m, n) ndarray
-        A_q and A_v, the derivatives of J qddot + Jdot qdot.
+        A_q and A_v, the derivatives of J qddot + Jdot qdot with respect to q and qdot.
     """
 
     velocity_q: np.ndarray
@@ -80,24 +80,24 @@ class TaskMap(Summary):
     """
 
     in_tool_axes: ClassVar[bool] = False
-    """Whether twists are along the axes of the tool frame; otherwise they are along those of the world."""
+    """Whether twists are along the axes of the tool frame; otherwise they are along the axes of the world."""
 
     robot: Robot
     rows: tuple[str, ...]
 
     @cached_property
     def axes(self) -> tuple[int, ...]:
-        """World axes (0, 1, 2) of the position rows; none in a space of joints."""
+        """World axes (0, 1, 2) of the position rows; none in a joint space."""
         return tuple(AXES.index(row) for row in self.rows if row in AXES)
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """Rows after the position: an angle, or three rows of rotation; none in a space of joints."""
+        """Rows after the position: an angle, or three rows of rotation; none in a joint space."""
         return () if joints_of(self.rows) else self.rows[len(self.axes) :]
 
     @cached_property
     def prescribed(self) -> Prescribed:
-        """The prescribed quantities of the tool, in the form that the kernel needs; none in a space of joints."""
+        """The prescribed quantities of the tool, in the form that the kernel needs; none in a joint space."""
         return Prescribed(self.axes, len(self.angles), in_tool_axes=self.in_tool_axes)
 
     @property
@@ -116,7 +116,7 @@ class TaskMap(Summary):
         Raises
         ------
         InputError
-            Their number differs from the number of rows.
+            The number of coordinates differs from the number of rows.
         """
         if isinstance(stated, ToolPose):
             rotation = stated.rotation.as_matrix()
@@ -139,7 +139,7 @@ class TaskMap(Summary):
         return self.of_placements(*self.robot.tool_placements(q))
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return the task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); not for joints."""
+        """Return the task coordinates, (K, c), of tool positions (K, 3) and rotations (K, 3, 3); not in joint space."""
         return positions[:, list(self.axes)]
 
     def difference(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -162,7 +162,7 @@ class TaskMap(Summary):
         return chain.tool(q, in_tool_axes=self.in_tool_axes)
 
     def rates(self, twists: np.ndarray) -> np.ndarray:
-        """Return the task velocity, (m, ...), of twists of the tool, (6, ...); not for a space of joints."""
+        """Return the task velocity, (m, ...), of twists of the tool, (6, ...); not in joint space."""
         return twists[self.prescribed.parts]
 
     def jacobian(self, twists: np.ndarray) -> np.ndarray:

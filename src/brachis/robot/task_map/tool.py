@@ -18,8 +18,8 @@ class RowsAndOrientation(TaskMap):
     """Rows of the tool frame's position in the world frame, and its orientation.
 
     The rows are velocities along the world's axes and rotations about them. The task coordinates are the rows of the
-    position, then the rotation matrix row by row (9). If a virtual joint rolls the tool, they prescribe the direction
-    of the tool's z axis.
+    position, then the rotation matrix row by row (9). If a virtual joint rolls the tool, the rows prescribe only the
+    direction of the tool's z axis.
     """
 
     def of_placements(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
