@@ -220,7 +220,7 @@ WRONG_STARTS = [
     (
         "[1, 2, 3, 1, 0, 0, 0]",
         "pose",
-        r"path_start: a list does not state its convention.*quaternion_xyzw \(quaternion, w last: ROS",
+        r"path_start: a list does not state the convention.*quaternion_xyzw \(quaternion, w last: ROS",
     ),
     (
         "position: [1, 2, 3]",
@@ -246,7 +246,7 @@ WRONG_STARTS = [
         "null",
         "pose",
         (
-            r"path_start: with a free start posture, the start of the path is missing.*allowed: \{position: \[x, "
+            r"path_start: the start posture is free, but the start of the path is missing.*allowed: \{position: \[x, "
             r"y, z\], ...\} with one of"
         ),
     ),

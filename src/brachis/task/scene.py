@@ -1,4 +1,4 @@
-"""The scene of a task: bodies around the robot or carried by it, files of bodies, and the clearance between them."""
+"""The scene of a task: bodies around the robot or carried by it, scene files, and the clearance between bodies."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from brachis.task.settings import Placement
 from brachis.task.yaml_reader import read_yaml
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
-"""Keys of the shapes, of which a body has exactly one."""
+"""Keys of the shapes. A body has exactly one of these keys."""
 
 
 class Round(Model):
@@ -37,7 +37,7 @@ class Round(Model):
     radius: Positive
     """Radius, m."""
     length: Positive
-    """Length, for a capsule without its caps, m."""
+    """Length, m; that of a capsule excludes its caps."""
 
 
 class HalfSpaceShape(Model):
@@ -53,7 +53,7 @@ class SceneBody(CheckedModel):
     """A body of one shape, fixed to the world or to a link of the robot, that the robot must not touch."""
 
     name: Name | None = None
-    """Unique name. Null: its shape and its number."""
+    """Unique name. Null: shape and number of the body."""
     box: tuple[Positive, Positive, Positive] | None = None
     """Lengths along x, y and z, m."""
     sphere: Positive | None = None
@@ -61,10 +61,10 @@ class SceneBody(CheckedModel):
     cylinder: Round | None = None
     """Cylinder about z, centred at the origin: {radius: ..., length: ...}, m."""
     capsule: Round | None = None
-    """Capsule about z: like the cylinder, with round caps beyond its length, m."""
+    """Capsule about z: like cylinder, with round caps added to the length, m."""
     half_space: HalfSpaceShape | None = None
-    """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of it; offset is the distance from
-    the origin along the normal, m."""
+    """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of the body; offset is the distance
+    of the plane from the origin along the normal, m."""
     mesh: Name | None = None
     """Mesh file; its convex hull is used."""
     urdf: Name | None = None
@@ -72,17 +72,17 @@ class SceneBody(CheckedModel):
     scale: Positive = 1.0
     """Factor from the mesh's unit to m."""
     link: Name | None = None
-    """Link of the robot that carries it. Null: it is fixed to the world."""
+    """Link of the robot that carries the body. Null: the body is fixed to the world."""
     frame: Name | None = None
-    """Name of the frame in which it is placed. Null: the world."""
+    """Frame in which the body is placed. Null: the world."""
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of its origin in the world, its frame or its link, m."""
+    """Position of the body's origin in the world, its frame or its link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw, degrees."""
 
     @property
     def shape(self) -> str:
-        """Key of the body's shape."""
+        """Key of the shape that the body has."""
         return next(key for key in SHAPES if getattr(self, key) is not None)
 
     @property
@@ -128,23 +128,23 @@ class SceneBody(CheckedModel):
 
 
 class CollisionSettings(Model):
-    """The clearance, and the pairs of bodies that keep it."""
+    """The clearance, and the pairs of bodies to which it applies."""
 
     clearance: NonNegative = 0.01
-    """Least distance between bodies, m."""
+    """Minimum distance between bodies, m."""
     mode: Literal["auto", "avoid", "check", "off"] = "auto"
-    """avoid: the plan keeps the clearance, without a scene between the robot's own links. check: only the verification
-    checks it. off: distances are ignored. auto: avoid with a scene, else off."""
+    """avoid: the plan keeps the clearance; without a scene, only between links of the robot. check: only the
+    verification checks it. off: distances are ignored. auto: avoid if there is a scene, otherwise off."""
     self_collision: Flag = True
-    """Whether the clearance also holds between the links of the robot."""
+    """Whether the clearance also applies between links of the robot."""
     disable: tuple[tuple[Name, Name], ...] = ()
     """Pairs of links or bodies that may touch."""
     srdf: Name | None = None
-    """SRDF file whose disabled pairs may also touch."""
+    """SRDF file; the pairs that it disables may also touch."""
     padding: dict[Name, NonNegative] = Field(default={})
-    """Margins added to the bodies of links, by link, m."""
+    """Margin added to the bodies of each link, by link name, m."""
     capsules: Literal["none", "auto"] = "none"
-    """auto: put capsules along the links of a robot without collision geometry."""
+    """auto: links are covered with capsules if the robot has no collision geometry."""
 
 
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
@@ -163,12 +163,12 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
 
 
 class SceneSource(Model):
-    """A scene whose bodies are in a file of their own."""
+    """A scene whose bodies are in a separate file."""
 
     file: Name
     """Scene file, relative to the task file."""
     frame: Name | None = None
-    """Name of the frame of all bodies that state neither frame nor link. Null: the world."""
+    """Frame of all bodies that state neither frame nor link. Null: the world."""
 
 
 class SceneFile(Model):
@@ -177,22 +177,22 @@ class SceneFile(Model):
     brachis_scene: Version
     """Version of the format."""
     bodies: tuple[SceneBody, ...]
-    """Bodies as in scene. File names are relative to this file, and frames are those of the task."""
+    """Bodies as in scene. File names are relative to this file. Frames are those of the task."""
 
 
 def with_scene_of_file(
     content: Mapping[str, Any], source: str, folder: Path
 ) -> Mapping[str, Any]:
-    """Return the content of a task with the bodies of the file that its ``scene`` names.
+    """Return the content of a task, with ``scene: {file: ...}`` replaced by the bodies in the file.
 
     Parameters
     ----------
     content : mapping
         A task, not checked yet.
     source : str
-        File name, or what else the task came from, for messages.
+        File name or other origin of the task, for messages.
     folder : Path
-        What the file's path is relative to.
+        Folder to which the path of the file is relative.
     """
     scene = content.get("scene")
     if not isinstance(scene, Mapping) or "file" not in scene:
@@ -211,7 +211,7 @@ def with_scene_of_file(
 
 
 def with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:
-    """Return bodies with the paths of meshes and URDFs, relative to `folder`, made absolute."""
+    """Return bodies in which the paths of meshes and URDFs, relative to `folder`, are absolute."""
     return tuple(
         body.model_copy(
             update={

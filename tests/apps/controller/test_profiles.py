@@ -126,7 +126,7 @@ REFUSED = {
     "arm: {names: [A1, A2]}": "too few names for axes of the arm; found 6 joints",
     "coupled: {A3: {A9: 1}}": "no axis named 'A9'",
     "period: 0": "period: out of range",
-    "events: {start: x}": "no event of this name",
+    "events: {start: x}": "no event with this name",
     "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
 }
 
@@ -179,6 +179,6 @@ def test_degrees_and_mm_are_named_in_the_header(turn, tmp_path):
 
 
 def test_ros_2_refuses_degrees(turn, tmp_path):
-    with pytest.raises(InputError, match="takes rad and m; found m, deg"):
+    with pytest.raises(InputError, match="needs rad and m; found m, deg"):
         brachis.export.write(turn, tmp_path / "run.yaml", degrees=True)
     assert not (tmp_path / "run.yaml").exists()

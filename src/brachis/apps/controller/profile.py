@@ -31,7 +31,7 @@ from brachis.task.yaml_reader import read_yaml
 
 _FOLDER: Final = Path(__file__).with_name("profiles")
 _LARGEST = 100_000
-"""Bytes of a profile."""
+"""Maximum size of a profile, bytes."""
 
 AngleUnit = Literal["rad", "deg"]
 LengthUnit = Literal["m", "mm"]
@@ -41,35 +41,35 @@ class Axis(Model):
     """One axis of the controller, and the joint of the URDF that it moves."""
 
     joint: Name
-    """Joint of the URDF."""
+    """Name of the joint in the URDF."""
     name: Name | None = None
-    """Name. Default: the next one of arm or external."""
+    """Name of the axis. Default: the next one of arm or external."""
     sign: Literal[-1, 1] = 1
-    """-1: the axis turns against the joint."""
+    """-1 if the axis turns in the opposite direction to the joint."""
     zero: Number = 0.0
-    """Position of the joint where the axis is 0, rad (m)."""
+    """Position of the joint at which the axis is 0, rad (m)."""
     external: Flag = False
     """Whether the axis is external, such as a rail."""
 
 
 class AxisGroup(Model):
-    """Names and units of the arm's axes, or of the external ones."""
+    """Names and units of the axes of the arm, or of the external axes."""
 
     names: tuple[Name, ...] = ()
-    """Names, in order. Default: those of the joints."""
+    """Names in the order of the axes. Default: the names of the joints."""
     angle: AngleUnit = "rad"
-    """Unit of turning axes, rad or deg."""
+    """Unit of rotary axes, rad or deg."""
     length: LengthUnit = "m"
-    """Unit of sliding axes, m or mm."""
+    """Unit of linear axes, m or mm."""
 
 
 class Language(Model):
-    """The language of a controller's programs of positions."""
+    """The language in which programs of positions are written for a controller."""
 
     suffix: Annotated[Name, Field(pattern=r"^\.[a-z0-9]+$")]
-    """Suffix of its files."""
+    """Suffix of the program file."""
     external_axes: Flag = True
-    """Whether a position may have external axes."""
+    """Whether positions can include external axes."""
     template: Name
     """Jinja template with the variables name (of the motion), robot, title, t_end (s), is_linear, report.positions,
     report.place (m, rad), report.time (s), axes.names, axes.units, axes.external and steps. A step has values (in the
@@ -77,7 +77,7 @@ class Language(Model):
 
 
 class Profile(CheckedModel):
-    """How a controller takes a motion, and what it makes of it.
+    """Description of a controller: the motions that it accepts, and how it runs them.
 
     Examples
     --------
@@ -92,9 +92,9 @@ class Profile(CheckedModel):
     title: Name
     """Name of the controller and its interface."""
     sources: NonEmpty[Name]
-    """Sources of the figures."""
+    """Documents from which the figures come."""
     unknown: tuple[Name, ...] = ()
-    """What is not documented in public."""
+    """Facts about the controller that are not publicly documented."""
     period: Positive
     """Time between samples, s."""
     fixed_period: Flag = True
@@ -102,38 +102,39 @@ class Profile(CheckedModel):
     interpolation: Literal["hold", "linear", "cubic", "quintic"]
     """Motion between samples: hold, linear (straight joint lines), cubic, or quintic (with accelerations)."""
     formats: NonEmpty[Name] = ("csv",)
-    """Export formats that the controller takes."""
+    """Export formats that the controller accepts."""
     columns: NonEmpty[Literal["q", "qd", "qdd", "tau"]] = ("q",)
-    """Columns of tables: q, qd, qdd, tau."""
+    """Quantities in tables: q, qd, qdd, tau."""
     arm: AxisGroup = AxisGroup()
     """Names and units of these axes."""
     external: AxisGroup = AxisGroup()
     """Names and units of these axes."""
     axes: tuple[Axis, ...] = ()
-    """Axes, in the controller's order. Default: the arm's joints, then, as external axes, sliding ones before them."""
+    """Axes, in the controller's order. Default: the joints of the arm, then linear joints before them as external
+    axes."""
     coupled: dict[Name, dict[Name, Number]] = Field(default_factory=dict)
-    """Multiples of axes that are added to others: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
+    """Multiples of other axes to add to an axis: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
     program: Language | None = None
-    """Language of programs of positions."""
+    """Language of programs that consist of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
-    """Limits that the controller checks, as in robot.limits; lists in the order of the arm's axes."""
+    """Limits that the controller checks, as in robot.limits. Lists are in the order of the axes of the arm."""
     rest: Literal["velocity", "full"] = "velocity"
-    """What must be zero at both ends: velocity, or full (the acceleration too)."""
+    """Derivatives that must be zero at both ends: velocity, or full (also the acceleration)."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
-    """Decimals of positions in tables. Null: all digits."""
+    """Number of decimals of positions in tables. Null: all digits."""
     path_tolerance: Positive = 1e-4
-    """Largest deviation of the tool from the path, m and rad."""
+    """Maximum deviation of the tool from the path, in m and in rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
-    """Instructions where a process speed begins and ends: {process_on: ..., process_off: ...}."""
+    """Instructions for the begin and the end of a process speed: {process_on: ..., process_off: ...}."""
 
     @property
     def is_sampled(self) -> bool:
-        """Whether only the samples are known, and not what is between them."""
+        """Whether the motion is known only at the samples, not between them."""
         return self.interpolation in ("hold", "linear")
 
     @property
     def last(self) -> str:
-        """Time of the last sample; see `Trajectory.sample`."""
+        """How the time of the last sample is chosen; see `Trajectory.sample`."""
         return "hold" if self.is_sampled else "exact"
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -145,11 +146,11 @@ class Profile(CheckedModel):
             )
         for name in self.events:
             if name not in EVENTS:
-                yield "events", "there is no event of this name", ", ".join(EVENTS)
+                yield "events", "there is no event with this name", ", ".join(EVENTS)
 
 
 EVENTS: Final = ("process_on", "process_off")
-"""Events of a motion."""
+"""Names of the events in a motion."""
 
 
 def profile_names() -> list[str]:
@@ -170,8 +171,8 @@ def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
     Parameters
     ----------
     source : str, path or Profile
-        Name of an included profile, or a YAML file. A file may begin with ``extends: NAME`` and state only what differs
-        from the profile NAME.
+        Name of an included profile, or a YAML file. A file may begin with ``extends: NAME`` and then state only the
+        keys that differ from the profile NAME.
 
     Raises
     ------
@@ -196,7 +197,7 @@ def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
 
 
 def _read(path: Path, where: str) -> Any:
-    """Read the keys of a profile, with those of the profile that it extends."""
+    """Read the keys of a profile, merged with the keys of the profile that it extends."""
     check_kind(path, "a profile", TaskError)
     text = read_text(path, where=where, folder=Path.cwd(), largest=_LARGEST)
     content = read_yaml(text, str(path))
