@@ -187,7 +187,7 @@ _ROWS = (
     LimitKind(
         "rms_torque",
         _TORQUE,
-        "Maximum root mean square of the torque over the motion, N m (force, N), which heats the motor.",
+        "Maximum root-mean-square torque over the motion, N m (force, N), to limit motor heating.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
         needs_masses=True,

@@ -151,7 +151,7 @@ class Task(CheckedModel):
     ] = Field(default={})
     """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
-    """Name of the frame in which path and path_start are given. Null: the world."""
+    """Frame in which path and path_start are given. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -193,8 +193,8 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: implausible figures cause errors. false: they cause warnings. null: only a start posture or named posture
-    that seems to be in degrees causes an error."""
+    """true: implausible figures cause errors. false: they cause warnings. null: only a start or named posture that
+    seems to be in degrees causes an error."""
 
     @model_validator(mode="before")
     @classmethod

@@ -64,7 +64,7 @@ class SceneBody(CheckedModel):
     """Capsule about z: like cylinder, with round caps added to the length, m."""
     half_space: HalfSpaceShape | None = None
     """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of the body; offset is the distance
-    of the plane from the origin along the normal, m."""
+    from the origin along the normal, m."""
     mesh: Name | None = None
     """Mesh file; its convex hull is used."""
     urdf: Name | None = None

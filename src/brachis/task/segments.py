@@ -169,7 +169,7 @@ class LineToPosture(Model):
     """A straight line to the tool position, in task spaces of poses also to the orientation, of a named posture."""
 
     to_posture: Name
-    """Name of a posture. The line ends at the tool position of this posture, for poses also in its orientation."""
+    """Posture whose tool position (for poses also orientation) is the end of the line."""
     has_orientations: ClassVar[bool] = True
 
 
@@ -207,7 +207,7 @@ class CircleTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, not zero; its sign is defined like that of an arc's angle."""
+    """Number of turns, not zero, with the sign convention of an arc's angle."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 

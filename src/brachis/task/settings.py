@@ -39,7 +39,7 @@ class Placement(Model):
     xyz: Vector3 = (0.0, 0.0, 0.0)
     """Position of the origin, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    """Roll, pitch and yaw about the fixed x, y and z axes, in this order, degrees, as in a URDF."""
+    """Roll, pitch and yaw about the fixed x, y and z axes, degrees, as in a URDF."""
 
     @model_validator(mode="before")
     @classmethod
@@ -65,7 +65,7 @@ class FramePlacement(Placement):
     """The placement of a named frame in the world or in another frame."""
 
     frame: Name | None = None
-    """Name of the frame relative to which it is placed. Null: the world."""
+    """Frame in which it is placed. Null: the world."""
 
 
 def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Placement:
@@ -256,7 +256,7 @@ class SplineSettings(CheckedModel):
     less than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower.
     """
     tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
-    """With intervals: auto, accepted increase of the end time compared with very many intervals, for example 0.1 % or
+    """With intervals: auto, accepted increase of the end time over that with very many intervals, such as 0.1 % or
     0.001."""
     knots: Literal["uniform", "free"] = "uniform"
     """uniform: intervals of equal length. free: their lengths are optimised."""
@@ -310,8 +310,7 @@ class SearchSettings(CheckedModel):
     out.
     """
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time limit of the whole plan, s. Then the best verified motion is returned, or up to 2 s later an unverified
-    one."""
+    """Time limit of the plan, s. Then the best verified motion is returned, or up to 2 s later an unverified one."""
     seed: Count = Field(default=0, ge=0)
     """Seed of the random numbers."""
     least_motion: Flag = True

@@ -143,10 +143,13 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"dt": 0.001}, "no other period; found 0.001 s; allowed: 0.004 s"),
-        ({"form": "json"}, "no such format; found json; allowed: csv, program"),
+        ({"dt": 0.001}, "not accept this period; found 0.001 s; allowed: 0.004 s"),
+        ({"form": "json"}, "not accept this format; found json; allowed: csv, program"),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
-        ({"form": "program", "time_tolerance": 1e-15}, "no program of positions keeps"),
+        (
+            {"form": "program", "time_tolerance": 1e-15},
+            "no program of positions is within",
+        ),
     ],
 )
 def test_options_that_a_controller_cannot_take_are_refused(

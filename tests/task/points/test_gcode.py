@@ -102,7 +102,7 @@ MISTAKES = [
         "G0 X1 Y1 Z1\nG91 G28 Z0",
         r"line 2: the reference position of the machine .*; found G28",
     ),
-    ("G0 X1 Y1 Z1\nG4 P2", r"line 2: a dwell is not read: .*; found G4"),
+    ("G0 X1 Y1 Z1\nG4 P2", r"line 2: a dwell cannot be read: .*; found G4"),
     ("G7 G18\nG0 X1 Y1 Z1", r"line 1: X would be a diameter: .*; found G7"),
     (
         "G0 X1 Y1 Z1\nG1 X2e1 F10",

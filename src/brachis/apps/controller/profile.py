@@ -41,11 +41,11 @@ class Axis(Model):
     """One axis of the controller, and the joint of the URDF that it moves."""
 
     joint: Name
-    """Name of the joint in the URDF."""
+    """Joint name in the URDF."""
     name: Name | None = None
-    """Name of the axis. Default: the next one of arm or external."""
+    """Axis name. Default: the next one of arm or external."""
     sign: Literal[-1, 1] = 1
-    """-1 if the axis turns in the opposite direction to the joint."""
+    """-1: axis and joint turn in opposite directions."""
     zero: Number = 0.0
     """Position of the joint at which the axis is 0, rad (m)."""
     external: Flag = False
@@ -56,7 +56,7 @@ class AxisGroup(Model):
     """Names and units of the axes of the arm, or of the external axes."""
 
     names: tuple[Name, ...] = ()
-    """Names in the order of the axes. Default: the names of the joints."""
+    """Names of the axes, in order. Default: joint names."""
     angle: AngleUnit = "rad"
     """Unit of rotary axes, rad or deg."""
     length: LengthUnit = "m"
@@ -71,9 +71,9 @@ class Language(Model):
     external_axes: Flag = True
     """Whether positions can include external axes."""
     template: Name
-    """Jinja template with the variables name (of the motion), robot, title, t_end (s), is_linear, report.positions,
-    report.place (m, rad), report.time (s), axes.names, axes.units, axes.external and steps. A step has values (in the
-    axes' units), duration (s), speed (m/s), percent (of velocity limits), zone (m; 0: stop) and event."""
+    """Jinja template. Variables: name (of the motion), robot, title, t_end (s), is_linear, report.positions,
+    report.place (m, rad), report.time (s), axes.names, axes.units, axes.external, steps. Each step has values (in axis
+    units), duration (s), speed (m/s), percent (of velocity limits), zone (m; 0: stop), event."""
 
 
 class Profile(CheckedModel):
@@ -90,11 +90,11 @@ class Profile(CheckedModel):
     brachis_profile: Version
     """Version of the format."""
     title: Name
-    """Name of the controller and its interface."""
+    """Name of controller and interface."""
     sources: NonEmpty[Name]
-    """Documents from which the figures come."""
+    """Sources of the figures."""
     unknown: tuple[Name, ...] = ()
-    """Facts about the controller that are not publicly documented."""
+    """Facts that are not publicly documented."""
     period: Positive
     """Time between samples, s."""
     fixed_period: Flag = True
@@ -102,7 +102,7 @@ class Profile(CheckedModel):
     interpolation: Literal["hold", "linear", "cubic", "quintic"]
     """Motion between samples: hold, linear (straight joint lines), cubic, or quintic (with accelerations)."""
     formats: NonEmpty[Name] = ("csv",)
-    """Export formats that the controller accepts."""
+    """Accepted export formats."""
     columns: NonEmpty[Literal["q", "qd", "qdd", "tau"]] = ("q",)
     """Quantities in tables: q, qd, qdd, tau."""
     arm: AxisGroup = AxisGroup()
@@ -110,22 +110,21 @@ class Profile(CheckedModel):
     external: AxisGroup = AxisGroup()
     """Names and units of these axes."""
     axes: tuple[Axis, ...] = ()
-    """Axes, in the controller's order. Default: the joints of the arm, then linear joints before them as external
-    axes."""
+    """Axes, in the controller's order. Default: the arm joints, then linear joints before them as external axes."""
     coupled: dict[Name, dict[Name, Number]] = Field(default_factory=dict)
-    """Multiples of other axes to add to an axis: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
+    """Multiples of other axes to add: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
     program: Language | None = None
-    """Language of programs that consist of positions."""
+    """Language of programs of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
-    """Limits that the controller checks, as in robot.limits. Lists are in the order of the axes of the arm."""
+    """Limits that the controller checks, as in robot.limits; lists in the order of the arm axes."""
     rest: Literal["velocity", "full"] = "velocity"
     """Derivatives that must be zero at both ends: velocity, or full (also the acceleration)."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
     """Number of decimals of positions in tables. Null: all digits."""
     path_tolerance: Positive = 1e-4
-    """Maximum deviation of the tool from the path, in m and in rad."""
+    """Maximum deviation of the tool from the path, m and rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
-    """Instructions for the begin and the end of a process speed: {process_on: ..., process_off: ...}."""
+    """Instructions at the begin and end of a process speed: {process_on: ..., process_off: ...}."""
 
     @property
     def is_sampled(self) -> bool:
