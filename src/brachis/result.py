@@ -63,7 +63,7 @@ class Result(PlannedMotion):
     """
 
     def plot(self, kind: str = "overview") -> Figure:
-        """Draw the motion.
+        """Plot the motion.
 
         Parameters
         ----------

@@ -345,7 +345,7 @@ AMBIGUOUS = [
     (
         "x,y,z,rx_deg,ry_deg,rz_deg",
         "",
-        r"staubli_xyz \(Rx about x.*the wrong one gives a wrong motion",
+        r"staubli_xyz \(Rx about x.*a wrong convention gives a wrong motion",
     ),
     (
         "x,y,z,a,b,c",
@@ -375,7 +375,7 @@ AMBIGUOUS = [
     (
         "x,y,z",
         "orientation: kuka",
-        r"csv.orientation: this convention of an orientation is unknown.*kuka_abc \(A",
+        r"csv.orientation: this orientation convention is unknown.*kuka_abc \(A",
     ),
 ]
 

@@ -25,7 +25,7 @@ class Where(TypedDict, total=False):
     position: Sequence[float]
     """Position in the world, in its frame, or in the frame of its link, m."""
     rpy_deg: Sequence[float]
-    """Roll, pitch, yaw about fixed axes, degrees."""
+    """Roll, pitch and yaw about fixed axes, degrees."""
 
 
 def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N802
@@ -90,7 +90,7 @@ def HalfSpace(  # noqa: N802
     offset : float, optional
         Distance of the plane from the origin along the normal, m.
     **where
-        See `Where`: ``name`` and ``frame``.
+        See `Where`: only ``name`` and ``frame`` are possible.
 
     Examples
     --------

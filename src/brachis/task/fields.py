@@ -52,9 +52,9 @@ from brachis.errors import MissingAttributeError
 REFUSED = "brachis_refused"
 """Error type of a value that one of the validators of brachis refuses; see `refuse`."""
 WRONG_FORM = "brachis_form"
-"""Error type of a value that has none of the forms of a union; see `ByForm`."""
+"""Error type of a value that does not have any form of a union; see `ByForm`."""
 WRONG_KEYS = "brachis_keys"
-"""Error type of a mapping whose keys do not select one member of a union; see `ByKey`."""
+"""Error type of a mapping whose keys do not select exactly one member of a union; see `ByKey`."""
 
 POSITION: Final = ("x", "y", "z")
 """Task-space rows of the tool position."""
@@ -200,7 +200,7 @@ class WithUnit:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Allow a string as an alternative to the number."""
+        """Allow a string as an alternative to a number."""
         text = {"type": "string", "pattern": self.pattern}
         return {"anyOf": [handler(schema), text]}
 
@@ -214,7 +214,7 @@ class WithUnit:
                 found=value,
                 allowed=f"a number with a unit ({', '.join(self.units)}), such as {self.example}, or a number",
             )
-        # Dividing gives 0.07 for 7 %, and not 0.07000000000000001.
+        # Division gives 0.07 for 7 %, but multiplication would give 0.07000000000000001.
         return float(match[1]) / (1.0 / self.units[match[2]])
 
 
@@ -443,4 +443,4 @@ _FORMS: Final[dict[Any, str | None]] = {
     (list, tuple): "<list>",
     (Mapping, BaseModel): "<mapping>",
 }
-"""Tags of the forms of values, by their types."""
+"""Tags for the forms of values, by type."""

@@ -69,7 +69,7 @@ def segments_along(
         sections, report = fit_curves(points, settings.tolerance, stops=stops)
     elif points.speed is not None and segment.speed is None:
         raise TaskError(
-            "feed rates need a fitted path",
+            "feed rates need a path fitted within a tolerance",
             found="feed rates",
             allowed="feed rates together with a tolerance",
             where=where,
@@ -141,7 +141,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
             found=report.listed_corners,
             allowed="no corners",
             where=f"{where}.corner",
-            hint="Set corner: blend to round them within the tolerance, or corner: stop to stop there",
+            hint="Set corner: blend to round the corners within the tolerance, or corner: stop to stop at them",
         )
     if isinstance(segment.orientation, Rotate | TurnTo):
         raise TaskError(

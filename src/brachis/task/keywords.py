@@ -193,7 +193,7 @@ def check_keywords(
         name,
         sorted((*known, *arguments)),
         where=where,
-        hint=hint and f"This name is a key inside another keyword: {hint}",
+        hint=hint and f"This is a key inside another keyword: {hint}",
     )
 
 
@@ -208,7 +208,7 @@ def _as_keyword(names: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Return a posture, or a solver given by name, in the form of a task file."""
+    """Return the value of a keyword as in a task file, where postures and solver names have a longer form."""
     if key == "solver":
         return expand_solver_name(value)
     if key not in {"start", "end"} or isinstance(value, str | Model):

@@ -215,7 +215,7 @@ def map_by_joint(
     names: Sequence[str],
     missing: object,
 ) -> dict[str, object]:
-    """Return the values by joint name, without those that are `missing`; see `per_joint_values`."""
+    """Return the values by joint name, without values equal to `missing`; see `per_joint_values`."""
     values = per_joint_values(key, value, names, missing)
     pairs = zip(names, values, strict=True)
     return {name: joint_value for name, joint_value in pairs if joint_value != missing}
@@ -234,7 +234,7 @@ class SpeedTable(CheckedModel):
     """
 
     s: Annotated[_PathCoordinates, Field(min_length=1)]
-    """Ascending path coordinates, 0 to 1. A coordinate given twice is a step."""
+    """Ascending path coordinates, 0 to 1. A coordinate that occurs twice is a step."""
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
     """Maximum speed at each path coordinate, m/s."""
 
@@ -271,7 +271,7 @@ class ProcessSpeed(Model):
     """A constant speed of the tool over a section of the path, for example for a glue nozzle or a laser."""
 
     speed: Speed
-    """Speed of the tool frame's origin, m/s."""
+    """Speed of the origin of the tool frame, m/s."""
     s: Annotated[
         tuple[
             Annotated[Number, Field(ge=0.0, lt=1.0)],
@@ -304,12 +304,12 @@ class ProcessSpeed(Model):
 
     @property
     def origin(self) -> str:
-        """The segment that states the speed, in words for messages; empty if none does."""
+        """Segment that states the speed, in words for messages; empty if the speed is not from a segment."""
         return "" if self.segment is None else f" of path[{self.segment}].speed"
 
 
 class ToolLimits(CheckedModel):
-    """Limits on the motion of the tool itself, even where tolerances let it leave the path."""
+    """Limits on the actual motion of the tool, also where tolerances let the tool leave the path."""
 
     speed: Annotated[
         Speed | SpeedTable | None,
@@ -325,8 +325,8 @@ class ToolLimits(CheckedModel):
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Sections of the path with a constant speed: {speed, s}, or a list of these in order, with gaps in which the speed
-    changes."""
+    """Sections of the path with a constant speed: {speed, s}, or a list of such sections in order, with gaps in which
+    the speed changes."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for number, (before, section) in enumerate(

@@ -57,7 +57,7 @@ class LimitsFile(CheckedModel):
             )
 
     def by_kind(self, where: str) -> dict[str, Any]:
-        """Return the limits by kind and joint, and the figures of the whole robot; `where` names the file."""
+        """Return the joint limits by kind and joint, and the limits on the whole robot; `where` names the file."""
         return {
             kind: value
             if kind in ROBOT_LIMITS
@@ -126,9 +126,9 @@ class RosLimitsFile(Model):
     joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)]
     """Limits of each joint: has_velocity_limits, max_velocity and so on."""
     default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Used as limits.scale.velocity if the task does not give it."""
+    """Value of limits.scale.velocity if the task does not state that factor."""
     default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Used as limits.scale.acceleration if the task does not give it."""
+    """Value of limits.scale.acceleration if the task does not state that factor."""
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:

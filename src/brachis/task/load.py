@@ -127,7 +127,7 @@ def read_assignment(text: str) -> tuple[str, object]:
 def with_keys(
     content: Mapping[str, Any], changes: Mapping[str, object]
 ) -> dict[str, Any]:
-    """Return the unchecked content of a task with dotted keys set; `content` itself stays unchanged."""
+    """Return a copy of the unchecked content of a task with some dotted keys set."""
     changed: Any = plain(content)
     for key, value in changes.items():
         set_key(changed, key, value)
@@ -205,12 +205,12 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
             where=str(path),
             found=str(error),
             allowed=f"a YAML file ({' or '.join(TASK_SUFFIXES)})",
-            hint="brachis new writes a first task",
+            hint="Run brachis new to write a first task",
         ) from error
     task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         raise TaskError(
-            "a task file needs this key, and it is missing",
+            "this key is missing, but a task file needs it",
             where=f"{path}: robot.urdf",
             hint="Set it to the path of the URDF, relative to the task file",
         )

@@ -131,7 +131,7 @@ def _names_in(location: _Location) -> list[str]:
 
 
 def _write_location(location: _Location, key: str) -> str:
-    """Return a location and a key below it in the form ``path[0].line.to``, without tags."""
+    """Return, without tags, a location and a key below it in the form ``path[0].line.to``."""
     keys = [
         f"[{step}]" if isinstance(step, int) else step
         for step in location
@@ -151,7 +151,7 @@ def models_in(annotation: object) -> Iterator[type]:
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
-    """Return the annotations of the fields of a model or dataclass by their names."""
+    """Return the annotations of the fields of a model or dataclass, by field name."""
     if issubclass(model, Model):
         return {name: field.annotation for name, field in model.model_fields.items()}
     return get_type_hints(model)
@@ -215,7 +215,7 @@ def _description_at(location: _Location, model: type[Model]) -> str | None:
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
-    """Return whether a list seems too short only because pydantic does not count its wrong items."""
+    """Return whether a list only seems too short because pydantic does not count wrong items."""
     return (
         detail["type"] == "too_short"
         and len(detail["input"]) >= detail["ctx"]["min_length"]
@@ -230,7 +230,7 @@ def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
         return "the list is too short: this item is missing", show(detail["input"])
     about = _description_at(detail["loc"], model)
-    return "this key is required, and missing", None, None, about
+    return "this required key is missing", None, None, about
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
@@ -272,12 +272,12 @@ def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
     shown = show(detail["input"])
     location = detail["loc"]
     if location and location[-1] == "[key]":
-        return "a name must be a string", shown, "a string, in quotes if need be"
+        return "a name must be a string", shown, "a string, in quotes if necessary"
     if detail["type"] in _TYPES:
         allowed = _TYPES[detail["type"]]
         keys = _keys_at(location, model) if allowed == _MAPPING else []
         if keys:
-            allowed += f" with keys out of {', '.join(keys)}"
+            allowed += f" with keys among {', '.join(keys)}"
         return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
@@ -302,7 +302,7 @@ _ALLOWED_AT: Final = {
 _KEYS_OF_OTHERS: Final = {
     "objective": "brachis always minimises the end time",
     "tool": "The frame that follows the path is robot.tool_frame",
-    "posture": "A posture is stated by its name: start: home, with postures: {home: [...]}",
+    "posture": "To use a named posture, write start: home and postures: {home: [...]}",
     "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
 }
 """Hints for keys that brachis does not have."""

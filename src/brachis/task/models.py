@@ -99,7 +99,7 @@ Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 
 class PathInFrame(Model):
-    """A path given in a named frame."""
+    """A path that is given in a named frame."""
 
     frame: Name
     segments: Segments
@@ -131,7 +131,7 @@ class Task(CheckedModel):
     posture. Null: the position of the tool in that posture, or the first waypoint."""
     end: FreePosture = "free"
     """Posture at the end, given like start. It must place the tool at the end of the path to within 1e-6 m or rad; the
-    nearest posture on the path is then used."""
+    nearest posture on the path is used."""
     task_space: TaskSpace
     """Coordinates that the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z
     axis), axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one
@@ -327,7 +327,7 @@ class Task(CheckedModel):
         if is_free and self.search.guesses == "numeric":
             yield (
                 "search.guesses",
-                "numeric inverse kinematics needs a posture to begin with, and start is free",
+                "numeric inverse kinematics needs a start posture, but start is free",
                 "lattice",
             )
         if has_path_start and self.of_poses and not is_pose:
@@ -407,7 +407,7 @@ class Task(CheckedModel):
             yield (
                 "spline.knots",
                 "free knots need a motion that starts and ends at rest",
-                "uniform, or a boundary at rest",
+                "uniform, or a motion that starts and ends at rest",
             )
         if self.boundary.periodic:
             if self.end != "free":
@@ -422,7 +422,7 @@ class Task(CheckedModel):
         if spline.intervals != "auto" and spline.intervals < least:
             yield (
                 "spline.intervals",
-                f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals",
+                f"rest: {spline.rest} leaves no freedom for splines of degree {spline.degree} with so few intervals",
                 f">= {least}, or auto",
             )
 

@@ -206,7 +206,7 @@ class AlongTangent(Model):
     """The tool turns with the tangent of the path."""
 
     tangent: Tangent
-    """The direction that stays up while the tool turns."""
+    """Direction that stays up while the tool turns."""
 
 
 Turning = Annotated[

@@ -28,7 +28,7 @@ OrientationWord = Annotated[
     Name,
     must(
         CONVENTIONS.__contains__,
-        "this convention of an orientation is unknown",
+        "this orientation convention is unknown",
         choices(),
     ),
     WithJsonSchema({"enum": list(CONVENTIONS)}),
@@ -121,7 +121,7 @@ class FitReport(Model):
     position_tolerance: NonNegative = 0.0
     """Maximum allowed distance, m; 0 if the path passes through all points."""
     orientation_error: NonNegative = 0.0
-    """Largest angle between a given and the fitted orientation, rad."""
+    """Largest angle between a given orientation and the fitted one, rad."""
     orientation_tolerance: NonNegative = 0.0
     """Maximum allowed angle, rad."""
     intervals: Count
@@ -141,7 +141,7 @@ class FitReport(Model):
         return name_first([str(corner) for corner in self.corners], ", ", count=10)
 
     def __str__(self) -> str:
-        """Return the report in one line, with lengths in mm."""
+        """Return the report as one line of text, with lengths in mm."""
         corners = "no corners"
         if self.corners:
             is_blended = any(corner.blend for corner in self.corners)

@@ -32,7 +32,7 @@ SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
 
 
 class Round(Model):
-    """A cylinder about its z axis, centred at the origin; also the cylindrical part of a capsule."""
+    """A cylinder about the z axis, centred at the origin, or the cylindrical part of a capsule."""
 
     radius: Positive
     """Radius, m."""
@@ -50,7 +50,7 @@ class HalfSpaceShape(Model):
 
 
 class SceneBody(CheckedModel):
-    """A body of one shape, fixed to the world or to a link of the robot, that the robot must not touch."""
+    """A body that the robot must not touch: one shape, fixed to the world or to a link of the robot."""
 
     name: Name | None = None
     """Unique name. Null: shape and number of the body."""
@@ -70,13 +70,13 @@ class SceneBody(CheckedModel):
     urdf: Name | None = None
     """URDF file of a cell without moving joints; its collision geometry is used."""
     scale: Positive = 1.0
-    """Factor from the mesh's unit to m."""
+    """Factor from the mesh unit to m."""
     link: Name | None = None
     """Link of the robot that carries the body. Null: the body is fixed to the world."""
     frame: Name | None = None
     """Frame in which the body is placed. Null: the world."""
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of the body's origin in the world, its frame or its link, m."""
+    """Position of the body origin in the world, frame or link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw, degrees."""
 
@@ -87,7 +87,7 @@ class SceneBody(CheckedModel):
 
     @property
     def size(self) -> float:
-        """Largest length that the shape states, m; 0 for a mesh or a URDF."""
+        """Largest length stated for the shape, m; 0 for a mesh or a URDF."""
         shape = getattr(self, self.shape)
         if isinstance(shape, Round):
             return max(shape.radius, shape.length)
@@ -122,7 +122,7 @@ class SceneBody(CheckedModel):
             if any(getattr(self, key)):
                 yield (
                     key,
-                    "a half-space is placed by its plane alone",
+                    "the position of a half-space is given only by its plane",
                     "normal and offset in half_space",
                 )
 
@@ -148,7 +148,7 @@ class CollisionSettings(Model):
 
 
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
-    """Name unnamed bodies by their shape and number, and refuse two bodies with the same name."""
+    """Name unnamed bodies by shape and number, and refuse bodies with the same name."""
     named = tuple(
         body.model_copy(update={"name": body.name or f"{body.shape} {number}"})
         for number, body in enumerate(scene)
@@ -157,7 +157,7 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise refuse(
-            "two bodies have this name", found=twice[0], allowed="each name once"
+            "two bodies have the same name", found=twice[0], allowed="each name once"
         )
     return named
 

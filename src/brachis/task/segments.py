@@ -96,7 +96,7 @@ class BSplineCurve(CheckedModel):
         if len({len(point) for point in self.control_points}) > 1:
             yield (
                 "control_points",
-                "control points differ in their number of coordinates",
+                "control points have different numbers of coordinates",
                 "the same number for all",
             )
         ends = (knots[0], knots[-1])
@@ -219,7 +219,7 @@ class HelixTurns(Model):
     turns: Turns = 1.0
     """Number of turns, not zero, positive about the normal."""
     pitch: Number
-    """Rise per turn along the normal, m."""
+    """Distance along the normal per turn, m."""
     normal: Direction = (0.0, 0.0, 1.0)
     """Axis of rotation (right-hand rule), of any length."""
 
@@ -230,7 +230,7 @@ class SplineThrough(CheckedModel):
     through: NonEmpty[Coordinates]
     """Waypoints, each with all task coordinates (m, angles in rad)."""
     orientations: tuple[Attitude, ...] | None = None
-    """For poses, orientation of the tool at each waypoint. Null: the orientation of the segment applies."""
+    """For poses, orientation of the tool at each waypoint. Null: as in the segment's orientation."""
     relative: Flag = False
     """Whether waypoints are relative to the start of the segment. If so, displacements are in the frame of the path and
     rotations in the tool frame."""
@@ -238,7 +238,7 @@ class SplineThrough(CheckedModel):
     """Expected start of the segment to within 1e-4 m or rad, all task coordinates. With relative, waypoints are
     relative to this point."""
     starts_oriented: Attitude | None = None
-    """Expected orientation at the start; only with orientations."""
+    """Expected orientation at the start; requires orientations."""
     fit: FitReport | None = None
     """Origin of the points; written by brachis."""
     joints: JointOrder = None
@@ -268,12 +268,12 @@ class SplineThrough(CheckedModel):
                 "the numbers of waypoints and of orientations differ",
                 key="orientations",
                 found=len(self.orientations),
-                allowed=f"{count}, as there are waypoints in through",
+                allowed=f"{count}, one for each waypoint in through",
             )
         if self.orientations is None and self.starts_oriented is not None:
             yield (
                 "starts_oriented",
-                "an orientation at the start needs orientations at the waypoints",
+                "an orientation at the start requires orientations at the waypoints",
                 "orientations as well",
             )
 
@@ -295,7 +295,7 @@ _Start = tuple[tuple[float, ...], Attitude | None]
 
 
 class SegmentModel(CheckedModel):
-    """The keys that all segments share."""
+    """Keys that are common to all segments."""
 
     blend: Positive | None = None
     """Rounding of the corner at the END of the segment: length cut from this segment and from the next, m."""
@@ -381,7 +381,7 @@ class MovingSegment(SegmentModel):
             yield (
                 "orientation",
                 f"the {self.kind} already has orientations",
-                f"orientation, or the orientations of the {self.kind} itself, not both",
+                f"either orientation, or the orientations of the {self.kind} itself",
             )
 
 

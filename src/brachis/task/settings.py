@@ -139,7 +139,7 @@ _WORDS: Final = {
     "wall": (0.0, 90.0, 0.0),
     "ceiling": (180.0, 0.0, 0.0),
 }
-"""Roll, pitch and yaw of the named mountings, degrees."""
+"""Roll, pitch and yaw of each named mounting, degrees."""
 
 
 def _expand_word(mounting: object) -> object:
@@ -148,7 +148,7 @@ def _expand_word(mounting: object) -> object:
         return mounting
     if mounting not in _WORDS:
         raise refuse(
-            "this is not a mounting",
+            "this mounting is unknown",
             found=mounting,
             allowed=f"{', '.join(_WORDS)}, or a mapping {{xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}}",
         )
@@ -246,7 +246,7 @@ Intervals = Annotated[
 
 
 class SplineSettings(CheckedModel):
-    """The B-splines of the path coordinate and the redundant joints."""
+    """Settings of the B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
     """Degree of the splines: 3 for a continuous torque, 4 for a continuous torque rate."""
@@ -270,7 +270,7 @@ class SplineSettings(CheckedModel):
 
     @property
     def vanishing(self) -> int:
-        """Number of derivatives of the joint positions that vanish at both ends and at stops."""
+        """Number of derivatives of the joint positions that are zero at both ends and at stops."""
         return _VANISHING[self.rest]
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -297,7 +297,7 @@ Jobs = Annotated[
 
 
 class SearchSettings(CheckedModel):
-    """The search over redundant joints, branches and initial guesses."""
+    """Settings of the search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
     """Extent of the search, from few to many guesses: single (one plan from the best guess; like fast if it fails),
@@ -312,7 +312,7 @@ class SearchSettings(CheckedModel):
     time_limit: Positive = Field(default=60.0, le=1e6)
     """Time limit of the plan, s. Then the best verified motion is returned, or up to 2 s later an unverified one."""
     seed: Count = Field(default=0, ge=0)
-    """Seed of the random numbers."""
+    """Seed of the random number generator."""
     least_motion: Flag = True
     """Whether to choose the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time. With more
     than 200 variables, which are common with intervals: auto, slower is required."""
@@ -329,7 +329,7 @@ class SearchSettings(CheckedModel):
 
 
 class SolverSettings(Model):
-    """The solver of the optimisation problem and its settings."""
+    """Settings of the solver of the optimisation problem."""
 
     name: Name = "auto"
     """auto (starts with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
@@ -383,5 +383,5 @@ class BoundarySettings(CheckedModel):
 
     @property
     def in_motion(self) -> bool:
-        """Whether the robot moves at an end of the path."""
+        """Whether the robot is in motion at an end of the path."""
         return self.periodic or self.start_speed > 0.0 or self.end_speed > 0.0

@@ -33,7 +33,7 @@ EACH_ONCE = must(
 )
 _ANGLE_LAST = must(
     lambda rows: {*rows[:-1]} <= {*POSITION},
-    "only one row of rotation is possible, and it comes last",
+    "only one row of rotation is possible, and it must be the last",
     "for example [x, y, z, yaw] or [x, y, axis]",
 )
 
@@ -63,13 +63,13 @@ def _range_within(largest: float) -> AfterValidator:
     """Return a validator that reads a number a as [-a, a], and refuses empty ranges and ends too far from zero."""
 
     def read(value: _Given) -> _Given:
-        """Return one range as a pair."""
+        """Return a range as a pair [low, high]."""
         if value is None or value == "free":
             return value
         low, high = value if isinstance(value, tuple) else (-value, value)
         if not -largest <= low < high <= largest:
             raise refuse(
-                "this is not a range",
+                "this is not a valid range",
                 found=value,
                 allowed=f"{_FORMS}, all within {largest:g} of zero",
             )

@@ -108,7 +108,7 @@ def _describe(node: yaml.Node) -> str:
     if isinstance(node, yaml.ScalarNode):
         return reprlib.repr(node.value)
     kind = "mapping" if isinstance(node, yaml.MappingNode) else "list"
-    return f"a {kind}: put it before each number that has this unit"
+    return f"a {kind}: put the tag before each number that has this unit"
 
 
 def _refuse_tag(_loader: _Loader, node: yaml.Node) -> NoReturn:

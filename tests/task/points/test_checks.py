@@ -123,7 +123,7 @@ def test_rounding_is_told_from_scatter():
     message = str(caught.value)
     for text in (
         "too rough",
-        "its curvature would be noise",
+        "the curvature would be noise",
         "rounded to 1e-06 m at 0.",
         "tolerance: {position:",
     ):

@@ -183,7 +183,7 @@ class Comparison(Summary):
         }
 
     def __str__(self) -> str:
-        """Return the whole comparison as text."""
+        """Return the comparison as text."""
         uses = map(str, self.uses)
         return "\n".join([self.verdict, *self.remarks, *uses, *self.recovered.told])
 
@@ -308,7 +308,7 @@ def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     if task.task_space != JOINTS:
         try:
             path = joint_path_of(recorded)
-        except PathError:  # the previous plans are used
+        except PathError:  # the fastest of the previous plans is used
             return
         yield task.model_copy(update={"task_space": JOINTS, "path": path})
 
@@ -356,7 +356,7 @@ def plot_both_motions(comparison: Comparison) -> Figure:
                 color=colour,
                 alpha=0.25,
                 linewidth=0.0,
-                label="recorded, between its rows: up to",
+                label="recorded, between rows: up to",
             )
             largest = known
         ratio.plot(t, largest, **look)

@@ -171,10 +171,10 @@ def compare_run(
     if errors.max() > 1.0:
         joint = axes.joints[int(np.argmax(errors.max(axis=0)))]
         raise InputError(
-            "this is not a run of the plan",
+            "this recording is not a run of the plan",
             where=str(recorded),
-            found=f"{joint} is {errors.max():.3g} rad or m away from the plan",
-            allowed="less than 1 rad or m; check profile and units",
+            found=f"{joint} deviates by {errors.max():.3g} rad or m from the plan",
+            allowed="less than 1 rad or m; check the profile and the units",
         )
     torques = None
     if recording.tau is not None and motion.robot.has_masses:

@@ -65,7 +65,7 @@ class ControllerAxes:
 
     @property
     def position_units(self) -> tuple[str, ...]:
-        """SI units of the axes."""
+        """SI unit of each axis."""
         return tuple("m" if unit in ("m", "mm") else "rad" for unit in self.units)
 
 

@@ -1,4 +1,4 @@
-"""Profiles of controllers, from YAML files."""
+"""Profiles of controllers, which are read from YAML files."""
 
 from __future__ import annotations
 

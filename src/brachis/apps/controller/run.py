@@ -178,7 +178,7 @@ def check_period(profile: Profile, period: float | None) -> float:
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
-    """Return the axes of a profile for a motion's robot.
+    """Return the axes of a profile, bound to the robot of a motion.
 
     Raises
     ------
@@ -256,7 +256,7 @@ class _SampledMotion(CheckedMotion):
 
     @cached_property
     def states(self) -> MotionStates:
-        """The motion at its nodes."""
+        """States of the motion at its nodes."""
         last = len(self.pieces.lengths) - 1
         index = np.append(np.arange(last + 1), last)
         u = np.zeros(last + 2)

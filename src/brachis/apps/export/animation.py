@@ -212,7 +212,7 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
             stderr=subprocess.PIPE,
         ) as process:
             assert process.stdin is not None
-            with suppress(BrokenPipeError):  # the messages say more
+            with suppress(BrokenPipeError):  # its messages give the reason
                 for picture in chain([first], pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
             _, messages = process.communicate()

@@ -117,8 +117,8 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
             "servoj needs the angles of six joints",
             where="joints",
             found=", ".join(f"{name} ({unit})" for name, unit in named),
-            allowed="six revolute joints, from the base on",
-            hint="List only the arm's six joints in joints, and write the others, such as a rail, in another format",
+            allowed="six revolute joints, starting at the base",
+            hint="List only the six joints of the arm in joints, and write others, such as a rail, in another format",
         )
     first, *postures = (
         f"[{', '.join(map(repr, row))}]" for row in rows.samples.q.tolist()

@@ -29,7 +29,7 @@ BLEND = 0.25
 _POINTS = 1000
 """Number of times at which the motion is compared with the program."""
 _STRICTER = 0.7
-"""Factor on the tolerances of single lines if the corners exceed them."""
+"""Factor by which the tolerances of single lines are reduced if rounded corners exceed the tolerances."""
 _ROUNDS = 12
 _FARTHER = 8
 """Maximum ratio of the duration of a line to that of the previous line."""
@@ -215,7 +215,7 @@ class _Follower:
         return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
 
     def _step(self, values: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the step, (k,), along the path towards task coordinates, (k, c)."""
+        """Return the step along the path, (k,), towards given task coordinates, (k, c)."""
         sample = self.path.sample(s)
         miss = self.task_map.difference(values, sample.target)
         along = sample.xi

@@ -17,7 +17,7 @@ from brachis.apps.export.rows import JointRows, require_library
 
 
 def write_csv(rows: JointRows, stream: BinaryIO) -> None:
-    """Write time, joint positions, velocities, accelerations and torques.
+    """Write a CSV table of time, joint positions, velocities, accelerations and torques.
 
     The header is ``t``, then ``q_<joint>`` of all joints, ``qd_<joint>``, ``qdd_<joint>`` and ``tau_<joint>``, in
     s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N); torques are left out if the URDF has no masses. If a joint
@@ -162,7 +162,7 @@ def samples_schema() -> dict[str, Any]:
 
 
 def write_json(rows: JointRows, stream: BinaryIO) -> None:
-    """Write samples as JSON that fulfils `samples_schema`."""
+    """Write samples as JSON that conforms to `samples_schema`."""
     names = ("t", "s", *rows.samples.columns.values())
     content = {
         "$schema": SCHEMA_ID,

@@ -62,7 +62,7 @@ class Scatter:
         return 6.0**0.5 * self.deviation / self.spacing**2
 
     def __str__(self) -> str:
-        """Describe the scatter in words."""
+        """Return a description of the scatter for messages."""
         spacing = f"at {1e3 * self.spacing:.3g} mm spacing"
         rounding = 0.0 if self.decimals is None else 10.0**-self.decimals
         if rounding / 12.0**0.5 > self.deviation / 3.0:
@@ -248,5 +248,5 @@ def _refuse_factors(points: Points) -> None:
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",
                 allowed=f"coordinates close to {points.describe(i)}",
-                hint="Are mm and m mixed, or is a decimal point missing? Write all rows in one unit",
+                hint="Check for mixed mm and m, or a missing decimal point. Write all rows in the same unit",
             )

@@ -17,7 +17,7 @@ from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
-"""Smallest angle of a corner, rad. Smaller changes of direction are left to the fit."""
+"""Minimum change of direction at a corner, rad. Smaller changes are left to the fit."""
 _SURE = 5.0
 """Largest change of compared angles attributed to scatter, in standard deviations; none of 50,000 points exceeds it."""
 _STRAIGHT = 0.7
@@ -207,7 +207,7 @@ def _locate(
         np.stack([a, -b], axis=1), centre_after - centre_before, rcond=None
     )
     place = (centre_before + steps[0] * a + centre_after + steps[1] * b) / 2.0
-    gap = u[i + 1] - u[i - 1]  # a corner is not at an end
+    gap = u[i + 1] - u[i - 1]  # an end of the path is not a corner
     after = float((position[i] - place) @ (a + b)) > 0.0
     far = np.linalg.norm(place - position[i]) > max(width, gap)
     if far or (least == 1 and after != from_after):
@@ -247,7 +247,7 @@ def fill_gaps(points: Points) -> Points:
     if points.has_quaternions:
         turning = with_like_signs(turning)
     gaps = write_count(int(np.count_nonzero(long)), "gap")
-    note = f"taken as straight: {gaps} longer than {times:g} times the usual spacing"
+    note = f"treated as straight: {gaps} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
     notes = (*points.notes, note)
     return replace(rows, position=position, turning=turning, notes=notes)

@@ -271,13 +271,13 @@ def fit_curves(
 def _report_corner(
     points: Points, corner: Corner, distance: float, blend: float
 ) -> FoundCorner:
-    """Return the report of a corner at a distance along the path, m, with its blend, m."""
+    """Return the report on a corner at a given distance along the path, m, with the length of its blend, m."""
     row = int(points.rows[corner.index])
     return FoundCorner(row=row, angle=corner.angle, distance=distance, blend=blend)
 
 
 def _profile(*columns: Array) -> tuple[Any, ...]:
-    """Return the largest values of columns in successive groups of rows, at most 400 groups."""
+    """Return the largest value of each column in successive groups of rows; there are at most 400 groups."""
     count = len(columns[0])
     starts = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
     largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
@@ -311,7 +311,7 @@ def cut_at_corners(
     largest = 0.5  # of the product of length and curvature due to scatter
     if scatter.curvature * length > largest:
         raise TaskError(
-            "the points are too rough for a curve through all of them: its curvature would be noise",
+            "the points are too rough for a curve through all of them: the curvature would be noise",
             found=f"{scatter}, which alone give a curvature of {scatter.curvature:.2g} 1/m",
             allowed=f"less than {largest / length:.2g} 1/m",
             where=points.source,

@@ -81,7 +81,7 @@ class Fit:
         return np.maximum(self.position_errors / tolerance.position, turning)
 
     def only(self, rows: slice) -> Fit:
-        """Return the fit with the errors of some of the points."""
+        """Return the same fit, with errors only at some of the points."""
         return replace(
             self,
             sigma=self.sigma[rows],
@@ -105,11 +105,11 @@ class Fit:
         )
 
     def worst(self, tolerance: FitTolerance) -> float:
-        """Return the largest of `ratios`."""
+        """Return the largest error relative to its tolerance; see `ratios`."""
         return float(self.ratios(tolerance).max())
 
     def worst_between_knots(self, tolerance: FitTolerance) -> Array:
-        """Return the largest of `ratios` in every interval, (N,)."""
+        """Return the largest of the `ratios` in each interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
         interval = np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
         np.maximum.at(worst, interval, self.ratios(tolerance))
@@ -212,7 +212,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
 
 
 def _arcs(position: Array) -> Array:
-    """Return the lengths of arcs between n positions, (n - 1,), m, from circles through three successive positions."""
+    """Return the arc lengths between n positions, (n - 1,), m, from circles through three successive positions."""
     chords = np.maximum(steps_of(position), 1e-9)
     directions = np.diff(position, axis=0) / chords[:, None]
     sine = steps_of(directions) * np.linalg.norm(

@@ -46,13 +46,13 @@ _OFFSET_CHANGES: Final = (
 )
 _REFUSED: Final = {
     "G4": "a dwell cannot be read: split the file there and set dwell on the segment",
-    "G7": "X would be a diameter: write radii (G8)",
+    "G7": "X would be a diameter; write radii (G8)",
     **dict.fromkeys(("G28", "G30"), "the reference position of the machine is unknown"),
     **dict.fromkeys(
         ("G73", "G76", *(f"G{number}" for number in range(81, 90))),
-        "canned cycles are not read",
+        "canned cycles cannot be read",
     ),
-    **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not read"),
+    **dict.fromkeys(("M97", "M98", "M99"), "subprograms cannot be read"),
 }
 """Codes after which the position of the tool would be unknown to this reader, with the reason."""
 _OFFSETS: Final = {"G54", "G55", "G56", "G57", "G58", "G59"}
@@ -197,7 +197,7 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
             codes.append(f"{letter}{float(text):g}")
         elif letter in "ABCUVW":
             raise machine.wrong(
-                "axes other than X, Y, Z are not read",
+                "axes other than X, Y, Z cannot be read",
                 letter + text,
                 "X, Y, Z, I, J, K, R, F",
             )
@@ -231,7 +231,7 @@ def _set_mode(machine: _Machine, code: str) -> None:
         machine.skipped.add(code)
     elif code != "G92":  # executed later, with the coordinates of its line
         raise machine.wrong(
-            "this code is not read",
+            "this code cannot be read",
             code,
             "G0 to G3, G17 to G21, G40, G43, G49, G54 to G59, G61, G64, G80, G90 to G92, G94",
         )
@@ -256,7 +256,7 @@ def _move(
         understood |= {"P", "R", *("IJK"[axis] for axis in machine.plane[:2])}
     for letter in sorted(set(values) - understood):
         raise machine.wrong(
-            f"the letter {letter} of this {motion} is not read, and may change the path",
+            f"the letter {letter} of this {motion} cannot be read, but may change the path",
             f"{letter}{values[letter]:g}",
             ", ".join(sorted(understood)),
         )
@@ -269,7 +269,7 @@ def _move(
                     f"{axis} is incremental (G91), but the position before this move is unknown",
                     f"{axis}{values[axis]:g}",
                     "an absolute position before G91",
-                    "Begin with G90 G0 and the position of the tool; with relative: true any position will do",
+                    "Begin with G90 G0 and the position of the tool; with relative: true any position is possible",
                 )
             base = 0.0 if absolute else start[i]
             end[i] = base + values[axis] * machine.unit
@@ -289,7 +289,7 @@ def _move(
 
 
 def _shares(count: int) -> Array:
-    """Return fractions of a move, (count, 1), evenly spaced up to 1."""
+    """Return evenly spaced fractions of a move up to 1, (count, 1)."""
     return (np.arange(1, count + 1) / max(count, 1))[:, None]
 
 

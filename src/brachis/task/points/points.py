@@ -92,7 +92,7 @@ class Points:
         return f"{self.row} {self.rows[i]}"
 
     def describe(self, i: int) -> str:
-        """Return the row and the position of a point in words."""
+        """Return the row and the position of a point as text."""
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
         return f"{self.name_row(i)}, [{place}] m"
 
@@ -123,7 +123,7 @@ def is_repeated(
 
 
 def sum_up(steps: npt.ArrayLike) -> Array:
-    """Return the sums, (n,), of the first 0, 1, 2, ... of n - 1 steps."""
+    """Return the cumulative sums of n - 1 steps, (n,), starting with 0."""
     return np.append(0.0, np.cumsum(steps))
 
 

@@ -72,7 +72,7 @@ class Table:
             column.
         """
         if not self.body:
-            raise TaskError("the file has no rows of numbers", where=self.source)
+            raise TaskError("the file contains no rows of numbers", where=self.source)
         values = []
         for number, line in self.body.items():
             where = f"{self.source}: line {number}"
@@ -281,7 +281,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
             f"the columns {', '.join(columns)} do not state the convention of the orientation",
             allowed=f"csv.orientation: {choices(possible)}",
             where=where,
-            hint="State it in the task, csv: {file: ..., orientation: ...}; the wrong one gives a wrong motion",
+            hint="State it in the task, csv: {file: ..., orientation: ...}; a wrong convention gives a wrong motion",
         )
     if stated is not None and stated not in possible:
         usual = [
@@ -368,7 +368,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
         ]
         stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
         if stated:
-            notes.append(f"{kind} in {' and '.join(stated)}, as the header says")
+            notes.append(f"{kind} in {' and '.join(stated)}, as stated in the header")
         return table.values[:, [place for place, _ in chosen]] * np.array(factors)
 
     position = [name for name in names if name in POSITION]
@@ -448,7 +448,7 @@ def _with_rolls(points: Points) -> Points:
     half_turns = np.column_stack([np.cross(before, axes), 1.0 + cosines])
     turns = Rotation.from_quat(half_turns)
     step = 1
-    while step < len(axes):  # the products of the first 1, 2, 3, ... turns
+    while step < len(axes):  # cumulative products of the turns
         turns = turns.concatenate([turns[:step], turns[step:] * turns[:-step]])
         step *= 2
     return replace(points, turning=with_like_signs(quaternions_of(turns * upright)))
