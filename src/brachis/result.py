@@ -132,12 +132,12 @@ class Result(PlannedMotion):
         Returns
         -------
         RunReport, ProgramReport or None
-            With a profile, the verification of the motion as the controller runs it.
+            With a profile, the verification of the run, or the deviation of a program from the motion.
 
         Raises
         ------
         InputError
-            See these functions.
+            As for these functions.
         """
         from brachis.apps import export
 

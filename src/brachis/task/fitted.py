@@ -280,7 +280,7 @@ def fit_path(
         w), rotation matrices, or yaw angles.
     speed : float or array_like, (n,), optional
         A single number is a process speed, held along the whole path. An array contains the maximum speed on the way to
-        each point, or NaN if none is prescribed; it requires a tolerance.
+        each point, or NaN if none is prescribed. An array requires a tolerance.
     units : mapping or FileUnits, optional
         ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``. By default m, rad (for yaw) and m/s.
     corner : {"blend", "refuse", "stop"}, optional
@@ -288,7 +288,7 @@ def fit_path(
     orientation : optional
         How the tool turns along the path, as in a task file, if no orientations are given.
     relative : bool, optional
-        Whether the path may start anywhere, as in a task file.
+        Whether the points are moved to the start of the segment, as in a task file.
 
     Returns
     -------

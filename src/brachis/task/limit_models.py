@@ -129,20 +129,21 @@ class LimitSpec(_TabledLimits):  # type: ignore[misc]
     Parameters
     ----------
     torque, velocity : float, sequence, array, mapping or None, optional
-        Nm or N; rad/s or m/s. One number for all joints, one for each in chain order, or numbers by joint name. A pair
-        [lower, upper] around zero can replace the number of a joint. None, also as the value of a single joint: no
-        limit. `FROM_URDF`: as in the URDF.
+        Limits in Nm or N, and in rad/s or m/s: one number for all joints, one for each joint in chain order, or numbers
+        by joint name. A pair [lower, upper] around zero can replace the number of a joint. None, also as the value of a
+        single joint: no limit. `FROM_URDF`: as in the URDF.
     position : sequence, array, mapping or None, optional
         Pairs [lower, upper], rad or m, in the same forms. None as an end means that the range is open there.
     acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
-        rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. A number, a sequence, a mapping or None, as for the
-        torque. Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at rest.
+        Limits in rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; and Nm/s or N/s: a number, a sequence, a mapping or
+        None, as for the torque. Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at
+        rest.
     total_power : float or None, optional
         Maximum sum of the powers of all joints, W.
     scale : mapping or LimitScale, optional
         Factors on limits, applied last.
     torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
-        Points [speed, torque] by joint name.
+        Points [speed, torque] of a curve, by joint name.
 
     Examples
     --------

@@ -163,8 +163,8 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
     ------
     TaskError
         The file cannot be read or is not YAML, or the task is wrong. One message lists the mistakes, with a line for
-        each of the first twenty: file, key, wrong value and allowed values. Also if a CSV file or a limits file is
-        wrong; the message then names the line or key.
+        each of the first twenty: file, key, wrong value and allowed values. A wrong CSV file or limits file also raises
+        this error; its message names the line or key.
 
     Examples
     --------

@@ -1,12 +1,12 @@
 """Ratios to limits that the rows of a recorded motion prove, whatever happens between the rows.
 
-A joint that moves by dq within a period h has the velocity dq / h at some time within it. Within two periods it has an
-acceleration equal to the second difference over h^2, and within three periods a jerk equal to the third difference over
-h^3 (mean value theorem of divided differences). If such a difference exceeds a limit, the motion certainly exceeds this
-limit. A limit on another quantity, such as a torque or the tool speed, is compared with the value that results from
-these means at the posture in the middle of the periods. Changes of posture and velocity within the periods are
-neglected. The amount that errors of the rows may add to a ratio is subtracted. Because these errors matter less over
-longer periods, several periods are also combined into one.
+A joint that moves by dq within a period h has the velocity dq / h at some time within this period. Within two periods
+it has an acceleration equal to the second difference over h^2, and within three periods a jerk equal to the third
+difference over h^3 (mean value theorem of divided differences). If such a difference exceeds a limit, the motion
+certainly exceeds this limit. A limit on another quantity, such as a torque or the tool speed, is compared with the
+value that results from these means at the posture in the middle of the periods. Changes of posture and velocity within
+the periods are neglected. The amount that errors of the rows may add to a ratio is subtracted. Because these errors
+matter less over longer periods, several periods are also combined into one.
 """
 
 from __future__ import annotations

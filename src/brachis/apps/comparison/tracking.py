@@ -122,9 +122,9 @@ def compare_run(
     Raises
     ------
     TaskError
-        The file is not understood; the message names line and column.
+        The file cannot be read; the message names line and column.
     InputError
-        The profile does not fit the robot, or the run has nothing to do with the plan.
+        The profile does not fit the robot, or the recording is not a run of the plan.
 
     Examples
     --------

@@ -122,11 +122,11 @@ def verify_run(
     ----------
     trajectory : Trajectory, Result or path
     profile : Profile, str or path
-        See `load_profile`.
+        Profile of the controller; see `load_profile`.
     period : float, optional
         Time between samples, s. By default the period of the profile.
     own_limits : sequence of LimitModel, optional
-        Limits of the user's own with which the motion was planned.
+        The user's own limits with which the motion was planned.
 
     Returns
     -------

@@ -34,7 +34,7 @@ def frames(
 ) -> Iterator[tuple[Figure, np.ndarray]]:
     """Yield the figure, always the same object, and its pixels, (height, width, 4) uint8, at every time.
 
-    The robot moves in front of its tool path and of its postures at regular times, with the time above. Beside it are
+    The robot moves in front of its tool path and a few of its postures, with the time above. Beside it are
     plots of active limits, for example torques, with a line at the current time.
 
     Parameters
@@ -115,7 +115,7 @@ def film_of(
     dt : float
         Time for which each picture is shown, s.
     step : float
-        Time of which the format allows only multiples as periods, s.
+        The period must be a multiple of this time, s.
     joints : sequence of str or None
         Must be None, because an animation shows the whole robot.
     slower : float

@@ -56,7 +56,7 @@ def write_for_controller(
     path : path
         File to write. Its suffix sets the format.
     profile : Profile, str or path
-        See `brachis.load_profile`.
+        Profile of the controller; see `brachis.load_profile`.
     form : str, optional
         Name of the format; ``program`` for a program of positions.
     dt : float, optional
@@ -66,7 +66,7 @@ def write_for_controller(
     tolerance, time_tolerance : float, optional
         For programs: maximum distance of the tool from the path, m and rad, and maximum difference in time, s.
     own_limits : sequence of LimitModel, optional
-        Limits of the user's own with which the motion was planned.
+        The user's own limits with which the motion was planned.
 
     Returns
     -------

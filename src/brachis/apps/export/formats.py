@@ -35,7 +35,7 @@ class Format:
     last : {"exact", "hold"}
         Default for the last sample; see `Trajectory.sample`.
     step : float or None
-        For an animation: time of which the period must be a multiple, s.
+        For an animation, the period must be a multiple of this time, s.
     """
 
     about: str
@@ -160,7 +160,7 @@ def write(
     slower : float, optional
         How many times slower an animation shows the motion.
     degrees, mm : bool, optional
-        Write angles in degrees, or lengths in mm.
+        Whether to write angles in degrees, or lengths in mm.
 
     Raises
     ------

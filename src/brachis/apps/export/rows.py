@@ -96,7 +96,7 @@ def rows_of(
     dt : float
         Period, s.
     last : {"exact", "hold"}
-        See `Trajectory.sample`.
+        How the last sample is chosen; see `Trajectory.sample`.
     joints : sequence of str or None
         Joints to sample, in this order. None: all joints of the robot, without virtual ones.
 

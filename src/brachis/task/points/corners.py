@@ -254,11 +254,12 @@ def fill_gaps(points: Points) -> Points:
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
-    """Return the length that a blend takes from either side, m, to pass a corner of straight lines at a distance, m.
+    """Return the length that a blend must cut from either side to pass a corner of straight lines at a distance, m.
 
     With `size` cut from each side and unit tangents a, b, the ends of the blend are at -size a and size b relative to
     the corner, and the parameter of the blend has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`.
-    Its middle is ``(b - a) (size / 2 - 11/64 length)`` away, and ``|b - a| = 2 sin(angle / 2)``.
+    The middle of the blend is ``(b - a) (size / 2 - 11/64 length)`` away from the corner, and ``|b - a| = 2 sin(angle /
+    2)``.
 
     Parameters
     ----------

@@ -218,13 +218,13 @@ def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
 def _read_columns(
     table: Table, rows: Rows, stated: str | None
 ) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
-    """Return the meaning of the columns of a table.
+    """Return the meaning of each column of a table.
 
     Parameters
     ----------
     table : Table
     rows : tuple of str or str
-        Rows of the task space, or its name if it is one of poses.
+        Rows of the task space, or its name if it is a task space of poses.
     stated : str, optional
         Convention of the orientations that the task states.
 
@@ -339,7 +339,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     text : str
         The table.
     rows : tuple of str or str
-        Rows of the task space, or its name if it is one of poses.
+        Rows of the task space, or its name if it is a task space of poses.
     settings : PointFile
         Units and convention of the orientations that the task states.
     source : str
