@@ -84,36 +84,36 @@ SEGMENTS: dict[str, tuple[type[BaseModel], ...]] = {
     "csv": (PointFile,),
 }
 BY_BRACHIS = "written by brachis."
-"""End of the descriptions of keys that no user writes."""
+"""End of the descriptions of keys that users do not write."""
 FILES: dict[str, type[BaseModel]] = {"units": FileUnits, "tolerance": FitTolerance}
 INTRODUCTION = """# Task files
 
 <!-- Made by docs/make_task_reference.py. -->
 
 A task file is YAML. Units are SI; `!degrees` and `!millimeters` before a number convert it to rad or m. File names are
-relative to the task file. Unknown keys are errors. Each key is shown with its default (`{...}`: a section of its own);
-`null` means none unless the text says otherwise. For completion in editors, run `brachis schema --out
-task.schema.json` and begin the task file with `# yaml-language-server: $schema=task.schema.json`.
+relative to the task file. Unknown keys are errors. Each key is listed with its default (`{...}`: a separate section).
+`null` means none unless stated otherwise. For completion in editors, run `brachis schema --out task.schema.json` and
+begin the task file with `# yaml-language-server: $schema=task.schema.json`.
 
 ```yaml
 start: {joints: [!degrees 30, !degrees -120, 2.0944]}   # rad without a tag
 end: {joints: {j1: !degrees 45, j2: -1.5708, j3: 0.5}}
 ```
 
-**Limits and friction.** If a key is absent, the URDF's value holds; `null` removes it. A number holds for all joints,
-and a list is in chain order. A mapping names joints; joints that it leaves out keep the URDF's values. For torque and
-velocity, lists and mappings may contain pairs `[lower, upper]` with lower < 0 < upper. Numbers must be from 1e-6 to
-1e12, also after scaling, and position ranges within 1e6 rad or m of zero.
+**Limits and friction.** If a key is absent, the URDF value applies; `null` removes it. A number applies to all joints.
+A list is in chain order. Joints that a mapping leaves out keep their URDF values. For torque and velocity, lists and
+mappings may contain pairs `[lower, upper]` with lower < 0 < upper. Numbers must be from 1e-6 to 1e12, also after
+scaling. Position ranges must be within 1e6 rad or m of zero.
 
-Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`; they also hold at both ends. The
+Limits on `jerk` and `torque_rate` need `spline.degree` >= 3 and `spline.rest: full`, and also apply at both ends. The
 torque rate includes the change of Coulomb friction, which is slower with a larger `coulomb_velocity`.
 
-A plan prints **the values in use**; they are in the saved motion and, under `in_use`, in the JSON. `brachis
-inspect task.yaml` shows them without planning, and refuses what a plan refuses at once.
+A plan prints **the values in use**. They are also in the saved motion and, under `in_use`, in the JSON. `brachis
+inspect task.yaml` shows and checks them without planning.
 
-**`torque_speed`** is a curve at the joint, not at the motor. The plan is too cautious for a drive that can brake with
-more torque. A motor with 1.27 N m at 3000 rpm and 4500 rpm without load, behind a 1:50 gear with efficiency 0.8 (speed
-= rpm * 2 pi / 60 / ratio, torque = torque * ratio * efficiency):
+**`torque_speed`** is a curve at the joint, not at the motor. For a drive that can brake with more torque, the plan is
+too cautious. Example: a motor with 1.27 N m at 3000 rpm, and 4500 rpm without load, behind a 1:50 gear with efficiency
+0.8 (speed = rpm * 2 pi / 60 / ratio, torque = torque * ratio * efficiency):
 
 ```yaml
 robot:
@@ -124,21 +124,20 @@ robot:
 
 **Implausible figures** (degrees for rad, mm for m, g for kg, mNm for N m, rpm for rad/s, factors above 10, an end
 time at the planner's lower bound) cause warnings on standard error, in `warnings` of the JSON and in `result.warnings`.
-`strict` (`--strict`, `--no-strict`, `brachis.plan(..., strict=True)`) turns all or none of them into errors.
+`strict` (`--strict`, `--no-strict`) turns all or none of them into errors.
 """
 
 SCALE = """
 `robot.limits.scale` has a factor, 1.0 by default, for each of these limits:
 {names}.
-The factor of `torque` also acts on torque-speed curves, that of `power` on `total_power`."""
+The factor of `torque` also applies to torque-speed curves, that of `power` to `total_power`."""
 
 LIMITS_FILE = """
 ## Limits files
 
-`robot.limits_file` names a YAML file of joint limits, such as `robots/panda_limits.yaml` with the published figures
-of the Franka Emika Panda. `robot.limits` overrides the file, joint by joint, and the file overrides the URDF. Limits of
-joints that do not move are ignored. A saved task does not need the file. In Python, `brachis.read_limits(path)` returns
-a `LimitSpec`.
+`robot.limits_file` names a YAML file of joint limits, such as `robots/panda_limits.yaml` with the published figures of
+the Franka Emika Panda. For each joint, `robot.limits` overrides the file, and the file overrides the URDF. Limits of
+joints that do not move are ignored. In Python, `brachis.read_limits(path)` returns a `LimitSpec`.
 
 Files **`joint_limits.yaml`** of MoveIt, ros2_control and Universal Robots can be used unchanged, also with `!degrees`
 and `!radians`:
@@ -158,27 +157,27 @@ joint_limits:
     max_effort: 330.0              # N m
 ```
 
-`has_..._limits: false` also removes the limit of the URDF. `default_velocity_scaling_factor` and
+`has_..._limits: false` also removes the URDF limit. `default_velocity_scaling_factor` and
 `default_acceleration_scaling_factor` become `limits.scale`. MoveIt's Setup Assistant sets them to 0.1;
-`robot.limits.scale: {velocity: 1, acceleration: 1}` restores the full limits. Files of Universal Robots may omit
-`_joint` at the end of joint names.
+`robot.limits.scale: {velocity: 1, acceleration: 1}` restores the full limits. In files of Universal Robots, `_joint`
+may be missing at the end of joint names.
 
 A limits file in the format of brachis has these keys:
 """
 PATH = """
 ## `path`
 
-A path is a list of segments. Each is a mapping with one kind (`line`, `arc`, `circle`, `helix`, `spline`, `bspline`,
-`csv` or `turn`) and optional keys of the list below. A segment starts where the previous one ends. The first one starts
-at `path_start`, at the place of the tool in the start posture, or at its first waypoint. The path must be smooth up to
-its third derivative; a corner needs a `blend` or a stop. Motions before and after a stop are planned together
-([phases](phases.md)).
+A path is a list of segments. Each segment is a mapping with one kind (`line`, `arc`, `circle`, `helix`, `spline`,
+`bspline`, `csv` or `turn`) and optional keys listed below. A segment starts where the previous one ends. The first
+segment starts at `path_start`, at the tool position of the start posture, or at its first waypoint. The path must be
+smooth up to its third derivative; a corner needs a `blend` or a stop. Motions before and after a stop are planned
+together ([phases](phases.md)).
 
-Points have all task coordinates: m, and rad for yaw, pitch or roll. For poses (`pose`, `pose_free_roll`) these are x,
-y, z, and `orientation` describes how the tool turns.
+Points have all task coordinates, in m and, for yaw, pitch or roll, in rad. For poses (`pose`, `pose_free_roll`) the
+coordinates are x, y, z, and `orientation` describes how the tool turns.
 
-**Rows.** Use `[x, y, z, yaw]` for a SCARA with a quill, a palletiser that keeps its tool level, or a gantry with a
-turning axis, `[x, z, pitch]` for an arm in the xz-plane, and `[y, z, roll]` for one in the yz-plane:
+**Rows.** Use `[x, y, z, yaw]` for a SCARA, a palletiser or a gantry with a rotary axis, `[x, z, pitch]` for an arm in
+the xz-plane, and `[y, z, roll]` for an arm in the yz-plane:
 
 ```yaml
 task_space: [x, y, z, yaw]
@@ -186,10 +185,10 @@ path:
   - line: {by: [-0.1, 0.12, 0, 1.0]}                         # m, m, m, rad
 ```
 
-The angle is 0 if the first axis of the tool frame that is perpendicular to the world's axis points along x (for roll:
-along y). No joint may tilt the tool.
+The angle is 0 if the first tool axis that is perpendicular to the world's axis points along x (for roll, along y). No
+joint may tilt the tool.
 
-`axis` prescribes the direction of the tool's z axis, for example of a torch whose roll is free. `[x, y, z, axis]` means
+`axis` prescribes only the direction of the tool's z axis, for example of a torch. `[x, y, z, axis]` means
 `pose_free_roll`. Segments turn the axis like a pose. With `axis` alone, all segments are `turn`.
 
 ```yaml
@@ -201,10 +200,10 @@ path:
 
 Rows that depend on each other, or that no joint changes, are refused.
 
-**Frames.** The path may be given in one of the `frames`, such as that of a workpiece, with `path: {frame: workpiece,
-segments: [...]}` or `path_frame`. This applies to segments, files of points, directions, orientations and
-`path_start`. Bodies of the scene and other frames are placed in it with `frame: workpiece`. If the task space has only
-some of x, y, z, the frame may be rotated only within these. Results are in the world frame.
+**Frames.** With `path: {frame: workpiece, segments: [...]}` or `path_frame`, the path is given in one of the `frames`.
+This applies to segments, files of points, directions, orientations and `path_start`. `frame: workpiece` places scene
+bodies and other frames in this frame. If the task space has only some of x, y, z, the frame may be rotated only within
+these. Results are in the world frame.
 
 ```yaml
 frames:
@@ -218,20 +217,20 @@ path:
     orientation: {rotate: {axis: [0, 0, 1], angle_deg: 20}}
 ```
 
-**Joints.** With `task_space: joints`, points are positions of all joints, rad (m), in chain order, and the lengths of
-paths and blends are in rad (m). Segments are `line` (`to`, `by`), `spline`, `bspline` and `csv`. See the example in
-[From toppra](from_toppra.md).
+**Joints.** With `task_space: joints`, points are positions of all joints, rad (m), in chain order. Lengths of paths and
+blends are also in rad (m). Possible segments are `line` (`to`, `by`), `spline`, `bspline` and `csv`
+([example](from_toppra.md)).
 """
 TURN = """
 ### `turn: {...}`
 
 For poses: the tool turns on the spot, by `rotate: {...}` or `to: {...}` as below. A turn can follow a turn about the
-same axis, or about any axis with `profile: smooth`. It cannot stand next to a segment that moves the position.
+same axis or, with `profile: smooth`, about any axis. It cannot be next to a segment that changes the position.
 """
 ORIENTATION = """## `orientation`
 
-For poses: how the tool turns along a segment. The segment starts with the orientation at the end of the previous one.
-Orientations are those of the tool frame in the frame of the path.
+For poses: how the tool turns along a segment. The segment starts with the orientation at the end of the previous
+segment. Orientations are those of the tool frame in the path's frame.
 
 ```yaml
 task_space: pose
@@ -244,17 +243,17 @@ path:
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
 ```
 
-Position and orientation advance together. With `profile: uniform` the tool turns by the same angle in every metre.
-If the next segment turns differently, the turning rate jumps, which is refused like a corner. Then use `profile:
+Position and orientation advance together. With `profile: uniform` the tool turns by the same angle in every metre. If
+the next segment turns differently, the turning rate jumps; like a corner, such a jump is refused. Then use `profile:
 smooth` (the rate and its first two derivatives are zero at both ends) or a `blend`, which rounds position and
 orientation.
 
 With `tangent` or `{tangent: {up: ...}}` the tool keeps its orientation in a frame with x along the tangent and y along
-up x tangent. It turns about `up` if the path turns, and pitches if the path rises. `up` must be more than 1 degree from
-the tangent.
+up x tangent. The tool turns about `up` if the path turns, and pitches if the path rises. The angle between `up` and the
+tangent must exceed 1 degree.
 
-A spline has one of its `orientations` at each waypoint; the start of the segment is not a waypoint. The orientation is
-smooth up to the third derivative. Successive orientations must differ by less than 180 degrees.
+The `orientations` of a spline are those at its waypoints, without the start of the segment. The orientation is smooth
+up to the third derivative. Successive orientations must differ by less than 180 degrees.
 
 ```yaml
 task_space: pose
@@ -273,9 +272,9 @@ CSV = """
 ## Files of points
 
 `csv: {file: poses.csv}` is a smooth curve along the points of a file, one per row. The first line names the columns, in
-any order. Empty lines and lines that begin with `#` are skipped. The columns are named like the rows of the task space
-(`x,y`, `x,y,z,yaw`, ...); for `axis` give an orientation as below. For a path of joints they are named like the joints
-(rad, m), and `units` and `tolerance` do not apply. For poses they are
+any order. Empty lines and lines that begin with `#` are skipped. Columns are named like the rows of the task space
+(`x,y`, `x,y,z,yaw`, ...); for `axis` give an orientation as below. For a joint path, columns are named like the joints
+(rad, m), and `units` and `tolerance` do not apply. For poses the columns are
 
 - `x,y,z`: positions, with the `orientation` of the segment;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;
@@ -287,23 +286,23 @@ any order. Empty lines and lines that begin with `#` are skipped. The columns ar
   manufacturer. `orientation` must state it: `rotation_vector`, `rpy`, `staubli_xyz` or `fanuc_wpr` for `rx,ry,rz`;
   `kuka_abc` or `rpy` (Mitsubishi) for `a,b,c`; `quaternion_wxyz` (ABB) or `quaternion_xyzw` for `q1` to `q4`.
 
-A column `feed` (or `f`, `speed`, `v`) states the largest speed on the way to each point, linear in between, besides
-`tool_limits`. It needs a `tolerance`. Columns are separated by commas, semicolons, tabs or spaces. Decimal commas are
-read unless commas separate the columns. Units are part of the column names (`x_mm`, `X [mm]`, `rx (deg)`,
-`feed_mm/min`) or given by `units`. brachis reports how it read the file.
+A column `feed` (or `f`, `speed`, `v`) states the maximum speed on the way to each point, in addition to `tool_limits`.
+Feed rates need a `tolerance`. Columns are separated by commas, semicolons, tabs or spaces. Decimal commas are read
+unless commas separate the columns. Units are part of the column names (`x_mm`, `X [mm]`, `rx (deg)`, `feed_mm/min`) or
+given by `units`.
 
-The segment starts at the first point, and so does the path with `start: free` and no `path_start`. A start more than
-1e-4 m or rad away is refused, unless `relative: true` moves the points there.
+The segment starts at the first point; with `start: free` and no `path_start`, so does the path. A different start (by
+more than 1e-4 m or rad) is refused, unless `relative: true` moves the points there.
 
 **Without a tolerance** the path passes through all points. Successive points with the same position are refused, unless
-the position never changes, and so are points so rounded or noisy that their curvature is only noise.
+the position never changes. Points so rounded or noisy that their curvature is only noise are also refused.
 
 **With a tolerance** the path is a quintic B-spline (C4) with few knots, even for 100,000 points. It passes through the
 first and last point, and may wind, cross itself or repeat itself. Repeated points are left out and reported. Spikes and
-changes of unit are refused, with their line. If two points are more than five times as far apart as usual, the path
-between them is straight. [Corners](cam_seam.md#corners) (more than 12 degrees at one place) are listed and rounded by
-blends. `brachis inspect TASK` and `brachis plan` print the findings, which are also in `result.fits` and the JSON.
-`brachis plot --kind fit` draws the errors.
+changes of unit are rejected, and the error names the line. If two points are more than five times as far apart as
+usual, the path between them is straight. [Corners](cam_seam.md#corners) (more than 12 degrees at one place) are listed
+and rounded by blends. `brachis inspect` and `brachis plan` print how the file was read, which is also in `result.fits`
+and the JSON. `brachis plot --kind fit` draws the errors.
 
 ```yaml
 start: free
@@ -319,11 +318,11 @@ path:
 
 **G-code** (`.nc`, `.ngc`, `.gcode`, `.tap`): G0 to G3 with I, J, K or R and turns (P), G17 to G21, G90, G91, G90.1,
 G91.1 and F; in mm by default. Commands that do not affect the path are skipped and reported. Cycles, cutter
-compensation, dwells, rotary axes, changes of the work offset, and letters that may change the path are refused, with
-their line. So is a move in G91 from an unknown place: begin with G90 G0 or G92.
+compensation, dwells, rotary axes, changes of the work offset, letters that may change the path, and a move in G91 from
+an unknown position are rejected, and the error names the line. Begin with G90 G0 or G92.
 
-The file becomes one `spline` or `bspline`, or one for each section between corners. A saved task does not need it.
-For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments, including the first point. Points may be
+The file becomes one `spline` or `bspline`, or one for each section between corners. Saved tasks need neither point
+files nor limits files. For arrays, `brachis.fit_path(points, tolerance=...)` returns the segments. Points may be
 positions, 4x4 matrices, SE3 objects, or positions with SciPy rotations.
 """
 
@@ -331,7 +330,7 @@ PROFILE_INTRODUCTION = """# A profile of your own
 
 <!-- Made by docs/make_task_reference.py. -->
 
-A YAML file for `--profile`. With `extends` it states only what differs from an included profile:
+A profile is a YAML file. With `extends` it contains only the differences from an included profile:
 
 ```yaml
 extends: fanuc_stream_8ms
@@ -347,9 +346,9 @@ coupled: {J3: {J2: 0}}
 limits: {velocity: [3, 3, 3, 6, 6, 9]}   # rad/s
 ```
 
-An axis is sign * (joint - zero) in its unit, plus coupled multiples. The profile is in rad and m. Every joint that
-moves needs an axis. Lists replace the included ones; mappings are merged. Check signs and zeros: at the start posture,
-the controller must display the first row of the file.
+An axis value is sign * (joint - zero) in its unit, plus coupled multiples. The profile is in rad and m. Every moving
+joint needs an axis. Lists replace included lists; mappings are merged. Check signs and zeros: at the start posture, the
+controller must display the first row of the file.
 
 ## Keys
 """
@@ -374,7 +373,7 @@ def rows(*models: type, above: set[str] | None = None) -> Iterator[str]:
             text = field.description or describe_fields(model)[name]
             meaning = " ".join(text.split())
             if meaning.endswith(BY_BRACHIS):
-                meaning = f"Of saved tasks; {BY_BRACHIS}"
+                meaning = f"In saved tasks; {BY_BRACHIS}"
             if field.is_required():
                 meaning = f"required. {meaning}"
             key = f"`{name}{_default(field)}`"

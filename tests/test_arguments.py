@@ -80,21 +80,21 @@ def test_wrong_arguments_have_a_message_with_the_right_ones(make, told):
         (
             {"tolerance": 1e-3},
             (
-                "This name is a key inside another keyword: "
+                "This is a key inside another keyword: "
                 "spline={'tolerance': ...} or solver={'tolerance': ...} or refine"
             ),
         ),
         (
             {"torque": 5.0},
-            "This name is a key inside another keyword: limits={'torque': ...}",
+            "This is a key inside another keyword: limits={'torque': ...}",
         ),
         (
             {"mass": 5.0},
-            "This name is a key inside another keyword: payload={'mass': ...}",
+            "This is a key inside another keyword: payload={'mass': ...}",
         ),
         (
             {"payload": 500},
-            "allowed: a mapping with keys out of mass, com, inertia. payload: Rigid body fixed to",
+            "allowed: a mapping with keys among mass, com, inertia. payload: Rigid body fixed to",
         ),
         (
             {"strict": "no"},
@@ -106,7 +106,7 @@ def test_wrong_arguments_have_a_message_with_the_right_ones(make, told):
         ),
         (
             {"tool_limits": 0.5},
-            "allowed: a mapping with keys out of speed, feed, acceleration, angular_speed, ",
+            "allowed: a mapping with keys among speed, feed, acceleration, angular_speed, ",
         ),
     ],
 )

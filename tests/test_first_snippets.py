@@ -91,7 +91,7 @@ def test_keywords_change_a_task():
 def test_a_wrong_keyword_is_answered_with_the_nearest():
     with pytest.raises(UnknownNameError, match="intervals"):
         brachis.plan("scara3", **LINE, interval=8)
-    with pytest.raises(TaskError, match="task_space: this key is required"):
+    with pytest.raises(TaskError, match="task_space: this required key is missing"):
         brachis.plan("scara3", path=brachis.Line(by=[0.0, 1.0]), start=Q0)
     with pytest.raises(TaskError, match=r"start\.joints\[0\]"):
         task_with(**{**LINE, "start": ["a", 0.0, 0.0]})
@@ -279,7 +279,7 @@ SCARA = {"start": Q0, "task_space": ["x", "y"]}
 ANSWERS = {
     'brachis.Robot("a.urdf")': (InputError, "from_urdf"),
     'brachis.plan("a.urdf")': (brachis.errors.UrdfError, "the file does not exist"),
-    "brachis.plan()": (TaskError, "task_space: What the path prescribes"),
+    "brachis.plan()": (TaskError, "task_space: Coordinates that the path prescribes"),
     'brachis.plan(robot="scara3", path=SEGMENT, **SCARA)': (
         InputError,
         "brachis.plan('scara3', path=...)",
@@ -302,7 +302,7 @@ ANSWERS = {
     ),
     'brachis.plan("scara3", path=SEGMENT, **SCARA, spline=30)': (
         TaskError,
-        "keys out of degree, intervals",
+        "keys among degree, intervals",
     ),
     'brachis.plan("scara3", path=np.sin, **SCARA)': (
         TaskError,

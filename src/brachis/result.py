@@ -28,7 +28,7 @@ class Result(PlannedMotion):
     Attributes
     ----------
     task : Task
-        The complete task, with the robot's settings and all defaults; ``plan(result.task)`` repeats the plan.
+        The complete task, with robot settings and all defaults; ``plan(result.task)`` repeats the plan.
     trajectory : Trajectory
     verification : Verification
     family : str
@@ -36,20 +36,20 @@ class Result(PlannedMotion):
     candidate : FinishedCandidate
         The fastest candidate, with its solved program and its motion.
     least_motion : LeastMotion or None
-        How the smoothest motion that is as fast was found; None if the task did not ask for it.
+        How the smoothest motion of equal speed was found; None if the task did not request it.
     timing : dict of str to float
         Wall time of every stage, s.
     candidates : tuple of Candidate
-        All candidates of the search, the fastest verified one first, without their programs.
+        All candidates of the search, without their programs. The fastest verified candidate comes first.
     interrupted : bool
-        Whether Ctrl-C or ``search.time_limit`` ended the search. A faster motion may then have been missed.
+        Whether Ctrl-C or ``search.time_limit`` ended the search; a faster motion may then have been missed.
     not_completed : tuple of str
-        What was left undone, in plain words.
+        Steps that were not completed, in plain words.
     warnings : tuple of Issue
         Implausible figures of the robot, the task and the motion, and a timing that is much slower than possible.
     timing_gap : TimingGap or None
-        How much faster another timing of the same joint path could be. None if the phase plane finds no faster timing,
-        or if no time was left to look for one.
+        How much faster a different timing of the same joint path could be. None if the phase plane gives no faster
+        timing, or if no time was left to compute one.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Result(PlannedMotion):
     """
 
     def plot(self, kind: str = "overview") -> Figure:
-        """Draw the motion.
+        """Plot the motion.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Result(PlannedMotion):
     def report(
         self, path: str | os.PathLike[str] | None = None, *, degrees: bool = False
     ) -> Report:
-        """Make a page that helps a person decide whether to run the motion, as `brachis.report.make_report` does.
+        """Make a page for deciding whether to run the motion, as `brachis.report.make_report` does.
 
         Parameters
         ----------
@@ -118,26 +118,26 @@ class Result(PlannedMotion):
         profile: Profile | str | None = None,
         **options: Any,
     ) -> RunReport | ProgramReport | None:
-        """Write the motion for another program, or for a controller.
+        """Write the motion to a file for another program or for a controller.
 
         Parameters
         ----------
         path : path
             File to write; its suffix sets the format.
         profile : Profile, str or path, optional
-            Controller that the file is for; see `brachis.load_profile`.
+            Profile of the controller that will run the file; see `brachis.load_profile`.
         **options
-            Of `brachis.export.write`, or with a profile of `brachis.export.write_for_controller`.
+            Options of `brachis.export.write` or, with a profile, of `brachis.export.write_for_controller`.
 
         Returns
         -------
         RunReport, ProgramReport or None
-            With a profile: what the controller makes of the motion.
+            With a profile, the verification of the run, or the deviation of a program from the motion.
 
         Raises
         ------
         InputError
-            See there.
+            As for these functions.
         """
         from brachis.apps import export
 
@@ -150,7 +150,7 @@ class Result(PlannedMotion):
     def bottleneck(
         self, *, check: bool = False, reference: bool = False
     ) -> BottleneckReport:
-        """Find out which limits hold the motion back, as `brachis.bottleneck.report` does."""
+        """Return a report on the limits that cost time, as `brachis.bottleneck.report` does."""
         from brachis.apps import bottleneck
 
         return bottleneck.report(self, check=check, reference=reference)

@@ -122,7 +122,7 @@ def test_a_posture_without_virtual_joints_is_as_near_to_the_path_as_ranges_allow
         ("orientation: {tilt: 15}", "position", "prescribe the orientation"),
         ("position: {sphere: 0.1}", ["x", "y"], "no tolerances of the position"),
         ("orientation: {roll: 5}", "pose_free_roll", "roll is free"),
-        ("orientation: {lead: [5, 2]}", "pose", "not a range"),
+        ("orientation: {lead: [5, 2]}", "pose", "not a valid range"),
         ("orientation: {lead: 100}", "pose", "within 80 of zero"),
         ("tilt: 15", "pose", "tolerances.orientation.tilt"),
         ("position: {sphere: 0.1, y: 0.1, axes: world}", "pose", "all three ranges"),

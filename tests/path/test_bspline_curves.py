@@ -179,7 +179,10 @@ WRONG = [
         {"points": wave(5), "speed": np.ones(4)},
         r"the numbers of points and of rows of speed differ",
     ),
-    ({"points": wave(5), "speed": np.ones(5)}, "feed rates need a fitted path"),
+    (
+        {"points": wave(5), "speed": np.ones(5)},
+        "feed rates need a path fitted within a tolerance",
+    ),
     (
         {"points": wave(5), "tolerance": {"position": "5 kg"}},
         r"tolerance.position: this is not a number with a unit; found '5 kg'.*0.05 mm",

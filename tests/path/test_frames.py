@@ -206,7 +206,7 @@ TWO_FRAMES = {"workpiece": PLACE, "table": PLACE}
         (
             [{"line": {"by": [0.1]}}],
             {"task_space": "joints"},
-            "path_frame: a path of joints cannot be in a frame",
+            "path_frame: a joint path cannot be in a frame",
         ),
         (
             {"frame": "workpiece", "path": SEGMENTS},

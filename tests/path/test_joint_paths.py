@@ -114,7 +114,10 @@ def test_a_corner_is_refused_with_its_place():
     "parts, words",
     [
         ({"degree": 3}, "degree"),
-        ({"knots": [0] * 5 + [1] * 6}, "wrong number of knots; found 11; allowed: 10"),
+        (
+            {"knots": [0] * 5 + [1] * 6},
+            "the number of knots is wrong; found 11; allowed: 10",
+        ),
         ({"knots": [0, 0, 0, 0, 0.1, *[1] * 5]}, "not clamped"),
         ({"knots": [1] * 5 + [0] * 5}, "not clamped"),
         (
@@ -137,5 +140,5 @@ def test_bsplines_that_are_none(parts, words):
     ],
 )
 def test_there_is_nothing_to_choose(key, more):
-    with pytest.raises(TaskError, match=f"{key}: a path of joints leaves no choice"):
+    with pytest.raises(TaskError, match=f"{key}: a joint path leaves no choice"):
         task([{"line": {"by": [1, 0, 0]}}], **more)

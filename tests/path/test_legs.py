@@ -129,7 +129,8 @@ def test_speeds_of_segments_and_of_parts():
     with pytest.raises(TaskError, match=r"a begin of path\[1\]\.speed above 0\.5"):
         problem([RIGHT, SEAM, RIGHT], part(0.3, 0.3, 0.5))
     with pytest.raises(
-        TaskError, match=r"largest speed is below the process speed of path\[1\]\.speed"
+        TaskError,
+        match=r"maximum tool speed is below the process speed of path\[1\]\.speed",
     ):
         problem([RIGHT, SEAM], limits={"speed": 0.05})
     (short,) = (leg for leg in problem([{**RIGHT, "speed": 2.0}]).legs if leg.speed)

@@ -226,7 +226,7 @@ def test_contradictions_are_refused_with_their_key(section, ours, theirs, key):
             "payload: {mass: 1, inertia: {ixx: 1, iyy: 1, izz: 9}}",
             r"payload\.inertia: the payload has a non-physical inertia",
         ),
-        ("mounting: roof", "mounting: this is not a mounting.*floor, wall, ceiling"),
+        ("mounting: roof", "mounting: this mounting is unknown.*floor, wall, ceiling"),
         ("tool_offset: {xyz: [0, 0]}", r"tool_offset\.xyz"),
     ],
 )

@@ -299,7 +299,7 @@ def test_a_limit_keeps_inside_its_bounds_as_far_as_both_ends_do():
         ("{sphere: 1.0, link: tol}", "tool"),
         (
             "{half_space: {normal: [0, 0, 1]}, position: [0, 0, 1]}",
-            "placed by its plane",
+            "given only by its plane",
         ),
         ("mesh: missing.stl", "missing.stl"),
     ],
@@ -311,7 +311,7 @@ def test_the_error_says_what_is_wrong_with_a_body(body, message):
 
 def test_names_of_bodies_are_unique_and_links_exist():
     twice = [{"name": "a", "sphere": 0.1}, {"name": "a", "sphere": 0.2}]
-    with pytest.raises(InputError, match="two bodies have this name"):
+    with pytest.raises(InputError, match="two bodies have the same name"):
         scene(bodies=twice)
     for wrong in ({"padding": {"link_66": 0.1}}, {"disable": [["link_66", "ball"]]}):
         with pytest.raises(InputError, match="link_6"):

@@ -164,7 +164,7 @@ MISTAKES = [
     ("0,0,0\n1,1,1", ["line 1: the columns are wrong; found 0, 0, 0"]),
     (
         "x,y,z\n0,0,0",
-        ["poses.csv: a path needs its start and at least one waypoint; found 1 row of"],
+        ["poses.csv: a path needs a start and at least one waypoint; found 1 row of"],
     ),
     (
         "x,y,z\n0,0,0\n1,2\n",
@@ -301,7 +301,7 @@ def test_the_tools_axis_leaves_the_roll_open():
 
 AXES = [
     ("0,0,1\n1,0,0,0,0,2", r"line 3: the axis's length is 2"),
-    ("0,0,1\n1,0,0,0,0,-1", r"line 3: the tool's axis reverses .*rows in"),
+    ("0,0,1\n1,0,0,0,0,-1", r"line 3: the tool axis reverses .*rows in"),
 ]
 
 
@@ -345,7 +345,7 @@ AMBIGUOUS = [
     (
         "x,y,z,rx_deg,ry_deg,rz_deg",
         "",
-        r"staubli_xyz \(Rx about x.*the wrong one gives a wrong motion",
+        r"staubli_xyz \(Rx about x.*a wrong convention gives a wrong motion",
     ),
     (
         "x,y,z,a,b,c",
@@ -375,7 +375,7 @@ AMBIGUOUS = [
     (
         "x,y,z",
         "orientation: kuka",
-        r"csv.orientation: this convention of an orientation is unknown.*kuka_abc \(A",
+        r"csv.orientation: this orientation convention is unknown.*kuka_abc \(A",
     ),
 ]
 

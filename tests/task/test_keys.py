@@ -72,8 +72,8 @@ def test_values_are_yaml(text, expected):
 @pytest.mark.parametrize(
     "value, found",
     [
-        ("[30, 0.12]", "a list: put it before each number that has this unit"),
-        ("{j1: 30}", "a mapping: put it before each number that has this unit"),
+        ("[30, 0.12]", "a list: put the tag before each number that has this unit"),
+        ("{j1: 30}", "a mapping: put the tag before each number that has this unit"),
         ("a", "'a'"),
         ("'30'", "'30'"),
         ("1e400", "'1e400'"),

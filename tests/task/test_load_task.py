@@ -275,13 +275,13 @@ MISTAKES = [
         "start: {joints: [1, '2']}",
         r"start.joints\[1\]: wrong type; found '2' \(a string\); allowed: a number",
     ),
-    ("start: {}", "start.joints: this key is required, and missing"),
+    ("start: {}", "start.joints: this required key is missing"),
     ("end: fre", "end: .*not defined in postures; found 'fre'.*allowed: free"),
     (
         "task_space: [x, yaw, roll]",
         r"task_space: only one row of rotation.*for example \[x, y, z, yaw\]",
     ),
-    ("task_space: [axis, x, y]", "task_space: only one.*it comes last"),
+    ("task_space: [axis, x, y]", "task_space: only one.*it must be the last"),
     ("task_space: [x, x]", r"task_space: a name occurs twice.*found \['x', 'x'\]"),
     (
         "task_space: [x, w]",
@@ -307,7 +307,10 @@ MISTAKES = [
         "path: [{arc: {via: [1], center: [1]}}]",
         r"path\[0\].arc: an arc needs exactly one of its forms",
     ),
-    ("path: [{line: {length: 1}}]", r"path\[0\].line.angle_deg: this key is required"),
+    (
+        "path: [{line: {length: 1}}]",
+        r"path\[0\].line.angle_deg: this required key is missing",
+    ),
     (
         "path: [{line: {length: -1, angle_deg: 0}}]",
         r"path\[0\].line.length: out of range; found -1",
@@ -382,7 +385,7 @@ MISTAKES = [
     ),
     (
         "spline: {rest: jerk, degree: 4, intervals: 4}",
-        "spline.intervals: rest: jerk leaves splines of degree 4 no freedom.*found 4; allowed: >= 5, or auto",
+        "spline.intervals: rest: jerk leaves no freedom for splines of degree 4 .*found 4; allowed: >= 5, or auto",
     ),
     ("robot: {urdf: a.urdf, limits: {jerk: -1}}", "robot.limits.jerk.*found -1"),
     (
@@ -414,7 +417,7 @@ def test_degree_two_is_accepted_where_only_the_velocity_vanishes():
 def test_required_keys(key):
     task = minimal()
     del task[key]
-    assert f"task: {key}: this key is required, and missing" in str(error_of(task))
+    assert f"task: {key}: this required key is missing" in str(error_of(task))
 
 
 def test_an_array_of_mistakes_does_not_fill_the_screen():
@@ -460,7 +463,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
         (
             "[1, 2]",
             [
-                "wrong type; found [1, 2] (a list); allowed: a mapping with keys out of brachis"
+                "wrong type; found [1, 2] (a list); allowed: a mapping with keys among brachis"
             ],
         ),
         ("", ["wrong type; found null; allowed: a mapping with keys"]),
@@ -528,7 +531,7 @@ def test_a_file_needs_a_urdf(tmp_path):
     file = written(
         tmp_path, COMPLETE.replace("  urdf: ../robots/scara3/robot.urdf\n", "")
     )
-    assert f"{file}: robot.urdf: a task file needs this key" in str(error_of(file))
+    assert f"{file}: robot.urdf: this key is missing" in str(error_of(file))
 
 
 def test_the_loader_leaves_the_mapping_as_it_is():

@@ -95,7 +95,7 @@ MISTAKES = [
     ),
     (
         "{line: {to: [1, 0, 0]}, orientation: {rotate: {axis: [0, 0, 1]}}}",
-        "rotate.angle_deg: this key is required, and missing",
+        "rotate.angle_deg: this required key is missing",
     ),
     (
         "{line: {to: [1, 0, 0]}, orientation: {rotate: {axis: [0, 0, 0], angle_deg: 9}}}",
@@ -180,7 +180,7 @@ MISTAKES = [
     ),
     (
         "spline: {through: [[1, 0, 0]], starts_oriented: {quaternion_wxyz: [0.6, 0, 0, -0.8]}}",
-        r"path\[0\].spline.starts_oriented: an orientation at the start needs orientations",
+        r"path\[0\].spline.starts_oriented: an orientation at the start requires orientations",
     ),
     (
         (
@@ -189,7 +189,7 @@ MISTAKES = [
         ),
         r"path\[0\].orientation: the spline already has orientations.*found 'fixed'",
     ),
-    ("csv: {}", r"path\[0\].csv.file: this key is required, and missing"),
+    ("csv: {}", r"path\[0\].csv.file: this required key is missing"),
 ]
 
 
@@ -220,7 +220,7 @@ WRONG_STARTS = [
     (
         "[1, 2, 3, 1, 0, 0, 0]",
         "pose",
-        r"path_start: a list does not state its convention.*quaternion_xyzw \(quaternion, w last: ROS",
+        r"path_start: a list does not state the convention.*quaternion_xyzw \(quaternion, w last: ROS",
     ),
     (
         "position: [1, 2, 3]",
@@ -230,7 +230,7 @@ WRONG_STARTS = [
     (
         "rpy_deg: [1, 2, 3]",
         "pose_free_roll",
-        "path_start.position: this key is required",
+        "path_start.position: this required key is missing",
     ),
     (
         "{position: [1, 2, 3], rpy_deg: [1, 2, 3]}",
@@ -246,7 +246,7 @@ WRONG_STARTS = [
         "null",
         "pose",
         (
-            r"path_start: with a free start posture, the start of the path is missing.*allowed: \{position: \[x, "
+            r"path_start: the start posture is free, but the start of the path is missing.*allowed: \{position: \[x, "
             r"y, z\], ...\} with one of"
         ),
     ),

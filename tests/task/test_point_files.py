@@ -38,7 +38,7 @@ def test_a_file_becomes_a_curve_that_needs_it_no_more():
     assert made.path_start == segment.bspline.control_points[0]
     assert (fit.source, fit.points, fit.corners) == ("seam.csv", 2_000, ())
     assert 0.0 < fit.position_error <= 0.1 * MM
-    assert fit.told[0] == "length in mm, as the header says"
+    assert fit.told[0] == "length in mm, as stated in the header"
     assert fit.told[1].startswith("positions that scatter by 0.01")
     Path("seam.csv").unlink()
     assert_comes_back(made)

@@ -32,8 +32,8 @@ def test_a_dwell_is_a_stop():
 @pytest.mark.parametrize(
     "keys, where, said",
     [
-        ("{stop: true, blend: 0.01}", "blend", "so its corner is not rounded"),
-        ("{dwell: 0.5, blend: 0.01}", "blend", "so its corner is not rounded"),
+        ("{stop: true, blend: 0.01}", "blend", "so the corner there is not rounded"),
+        ("{dwell: 0.5, blend: 0.01}", "blend", "so the corner there is not rounded"),
         ("{stop: false, dwell: 0.5}", "stop", "a dwell needs a stop"),
         ("dwell: 0.0005", "dwell", "0.001 s"),
         ("dwell: -0.5", "dwell", ">= 0"),

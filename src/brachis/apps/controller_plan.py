@@ -1,4 +1,4 @@
-"""Plans that hold as a controller runs them."""
+"""Plans whose motion meets its limits when a controller runs it."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from brachis.robot.limits import MAGNITUDES
 from brachis.task import Source, TaskKeywords
 
 _ROUNDS = 4
-"""Plans that are made, each with smaller limits than the one before."""
+"""Maximum number of plans, each with lower limits than the previous one."""
 _FULL_REST = 2
-"""Number of derivatives, velocity and acceleration, that vanish at the ends."""
+"""Number of derivatives (velocity, acceleration) that vanish at the ends."""
 _MARGIN = 1e-3
-"""By how much more than the excess a limit is made smaller."""
+"""Fraction by which a limit is reduced in addition to the excess."""
 
 
 def plan_for_controller(
@@ -44,15 +44,15 @@ def plan_for_controller(
     listener: Listener | None = None,
     **keywords: Unpack[TaskKeywords],
 ) -> tuple[Result, RunReport]:
-    """Plan a motion that holds its limits as a controller runs it.
+    """Plan a motion that meets its limits when a controller runs it.
 
-    The profile's limits and ends are added to the task. Where the sampled motion then exceeds a limit, the limit is
-    scaled down by the excess, and the task is planned again.
+    The limits of the profile and its conditions at both ends are added to the task. If the sampled motion then exceeds
+    a limit, this limit is reduced by the excess, and the task is planned again.
 
     Parameters
     ----------
     profile : Profile, str or path
-        Name of an included profile, or the file of one.
+        Profile, name of an included profile, or profile file.
     robot_or_task, task
         As for `brachis.plan`.
     own_limits : sequence of LimitModel, optional
@@ -67,12 +67,12 @@ def plan_for_controller(
     Result
         The last plan.
     RunReport
-        Its verification as the controller runs it.
+        Verification of the planned motion as the controller runs it.
 
     Raises
     ------
     InputError, PlanningError
-        As `brachis.plan`; or the profile does not fit the robot.
+        As for `brachis.plan`; also if the profile does not fit the robot.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def plan_for_controller(
 
 
 def _find_factors(run: RunReport, robot: Robot, *, is_first: bool) -> dict[str, float]:
-    """Return factors on limits of the robot that would make up for what a run exceeds."""
+    """Return factors on the limits of the robot that compensate for the excess of a run."""
     factors: dict[str, float] = {}
     for check in run.verification.checks:
         if check.passed:
@@ -136,7 +136,7 @@ def _find_factors(run: RunReport, robot: Robot, *, is_first: bool) -> dict[str, 
         kind = kind.replace(" ", "_")
         excess = check.value / check.allowed
         if kind == "path_error" and is_first:
-            # The sagitta of a straight line grows as the square of the speed.
+            # The deviation of a straight line from the curve grows as the square of the speed.
             kind = "velocity"
             excess = excess**0.5
         is_limited = kind in MAGNITUDES and np.isfinite(robot.limits.both_ways(kind)[1])

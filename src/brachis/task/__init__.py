@@ -1,4 +1,4 @@
-"""The task: the task file as frozen models, its loader and its schema. No numerics."""
+"""The task file as frozen models, with its loader and its schema, but without numerics."""
 
 from brachis.task.fitted import fit_path
 from brachis.task.keywords import RobotKeywords, TaskKeywords, check_keywords, task_with

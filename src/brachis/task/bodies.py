@@ -14,22 +14,22 @@ from brachis.task.scene import SceneBody
 
 
 class Where(TypedDict, total=False):
-    """The keywords that every body takes in addition to its shape."""
+    """Keywords of every body, in addition to those of its shape."""
 
     name: str
-    """Unique name; by default its shape and its number in the scene."""
+    """Unique name; by default the shape and number of the body in the scene."""
     link: str
-    """Link that carries the body; by default it stands still."""
+    """Link of the robot that carries the body; by default the body stands still."""
     frame: str
     """Frame of the task in which the body is placed; by default the world."""
     position: Sequence[float]
     """Position in the world, in its frame, or in the frame of its link, m."""
     rpy_deg: Sequence[float]
-    """Roll, pitch, yaw about fixed axes, degrees."""
+    """Roll, pitch and yaw about fixed axes, degrees."""
 
 
 def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a box with its lengths along x, y and z, m; for `where` see `Where`.
+    """Make a box from its lengths along x, y and z, m. For `where` see `Where`.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def Box(size: Sequence[float], **where: Unpack[Where]) -> SceneBody:  # noqa: N8
 
 
 def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a ball with a radius, m; for `where` see `Where`.
+    """Make a ball of given radius, m. For `where` see `Where`.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def Sphere(radius: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
 
 
 def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a cylinder about its z axis, centred at the origin, m; for `where` see `Where`.
+    """Make a cylinder about the z axis, centred at the origin; lengths in m. For `where` see `Where`.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def Cylinder(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:
 
 
 def Capsule(radius: float, length: float, **where: Unpack[Where]) -> SceneBody:  # noqa: N802
-    """Make a cylinder with round caps, which its length does not include, m; for `where` see `Where`.
+    """Make a cylinder with round caps; its length, m, excludes the caps. For `where` see `Where`.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def HalfSpace(  # noqa: N802
     offset : float, optional
         Distance of the plane from the origin along the normal, m.
     **where
-        See `Where`: ``name`` and ``frame``.
+        See `Where`: only ``name`` and ``frame`` are possible.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def HalfSpace(  # noqa: N802
 def Mesh(  # noqa: N802
     file: str | PathLike[str], scale: float = 1.0, **where: Unpack[Where]
 ) -> SceneBody:
-    """Make the convex hull of a mesh file; `scale` converts its unit to m; for `where` see `Where`.
+    """Make the convex hull of a mesh file; `scale` converts the unit of the mesh to m. For `where` see `Where`.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Segments for programs, joined to a path by ``+``.
+"""Functions that make segments in programs; ``+`` joins segments to a path.
 
-`Line`, `Arc`, `Circle`, `Helix` and `Spline` are made from the models in `brachis.task.segments`. Their keywords are
-the keys of a segment.
+`Line`, `Arc`, `Circle`, `Helix` and `Spline` are generated from the models in `brachis.task.segments`. Their keywords
+are the keys of a segment.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _S = TypeVar("_S", bound=SegmentModel)
 
 
 def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
-    """Return the function with which a program makes a segment; `example` goes into its docstring.
+    """Return the function that makes one kind of segment in programs; `example` goes into its docstring.
 
-    Its keywords are the keys of the segment's kind and of the segment itself. If the kind has a single form, its first
-    key can be positional.
+    The keywords of the function are the keys of the kind and of the segment itself. If the kind has a single form, its
+    first key can be positional.
     """
     (kind,) = required_keys(model)
     name = kind.capitalize()
@@ -54,7 +54,7 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
     signature = inspect.Signature(parameters)
 
     def make(*args: Any, **keys: Any) -> _S:
-        """Make the segment from positional and named values."""
+        """Make the segment from positional and keyword arguments."""
         bound = signature.bind(*args, **keys).arguments
         shape_keys = {key: value for key, value in bound.items() if value is not None}
         beside = {
@@ -76,8 +76,8 @@ def _constructor(model: type[_S], example: str) -> Callable[..., _S]:
 
 _DOCSTRING = """{summary}
 
-Arrays may stand for lists. The end of a line may be a transform such as Pinocchio's SE3. The waypoints of a spline may
-be a sequence of transforms or of (4, 4) matrices, and their orientations a SciPy Rotation or (n, 3, 3) matrices.
+Arrays are accepted as lists. The end of a line may be a transform such as Pinocchio's SE3. The waypoints of a spline
+may be a sequence of transforms or of (4, 4) matrices, and their orientations a SciPy Rotation or (n, 3, 3) matrices.
 
 Parameters
 ----------

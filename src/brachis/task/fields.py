@@ -1,8 +1,8 @@
 """Building blocks of the task models: the base class, strict scalar types, and unions chosen by form or by key.
 
-For a wrong value, a plain pydantic union reports one error per member. Here a function first looks at the value and
-picks the member that was meant, so that a wrong value gets one error, about what the user had in mind. Tags are written
-``<like this>`` because they appear in pydantic's error locations, from which `brachis.task.messages` removes them.
+For a wrong value, a plain pydantic union reports one error per member. Here a function first selects the member that
+the user probably meant, so that a wrong value causes a single error. Tags are written ``<like this>``, because they
+appear in pydantic's error locations, from which `brachis.task.messages` removes them.
 """
 
 from __future__ import annotations
@@ -50,28 +50,29 @@ from brachis.common.summary import show_value
 from brachis.errors import MissingAttributeError
 
 REFUSED = "brachis_refused"
-"""Error type of a value that one of our validators refuses; see `refuse`."""
+"""Error type of a value that one of the validators of brachis refuses; see `refuse`."""
 WRONG_FORM = "brachis_form"
-"""Error type of a value that has none of the forms of a union; see `ByForm`."""
+"""Error type of a value that does not have any form of a union; see `ByForm`."""
 WRONG_KEYS = "brachis_keys"
-"""Error type of a mapping whose keys do not select one member of a union; see `ByKey`."""
+"""Error type of a mapping whose keys do not select exactly one member of a union; see `ByKey`."""
 
 POSITION: Final = ("x", "y", "z")
-"""Rows of the tool's position."""
+"""Task-space rows of the tool position."""
 LEAST = 1e-6
 """Smallest allowed limit of torque, velocity, acceleration or their rates, in SI units."""
 LARGEST = 1e12
-"""Largest allowed coordinate, angle or limit, in SI units; products of larger numbers might overflow."""
+"""Largest allowed coordinate, angle or limit, in SI units. Products of larger numbers might overflow."""
 
 
 class Model(BaseModel):
-    """Base class of all parts of a task: frozen, without unknown keys, without NaN or infinity.
+    """Base class of all parts of a task: frozen, and without unknown keys, NaN or infinity.
 
     The docstring below a field is its description in the documentation, the JSON schema and messages; see
-    `describe_fields`. Pydantic itself would read the docstrings when classes are made, which takes longer than a plan.
+    `describe_fields`. Pydantic could read these docstrings itself, but only when classes are created, which takes
+    longer than a plan.
     """
 
-    # Instances are checked again, because a program can make limits that were never checked.
+    # Instances are checked again, because a program can create limits that were never checked.
     model_config = ConfigDict(
         frozen=True,
         extra="forbid",
@@ -83,18 +84,18 @@ class Model(BaseModel):
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an error that names the attribute that may be meant."""
+            """Raise an error that suggests the attribute that may be meant."""
             try:
                 return super().__getattr__(name)
             except AttributeError:
                 raise MissingAttributeError(self, name) from None
 
     def __repr__(self) -> str:
-        """Return the call by which a program makes it."""
+        """Return the call that creates the model in a program."""
         return f"{type(self).__name__}({', '.join(show_arguments(self))})"
 
     def __str__(self) -> str:
-        """Return the same as `repr`."""
+        """Return the same text as `repr`."""
         return repr(self)
 
 
@@ -112,14 +113,14 @@ def show_arguments(model: Model, without: str = "") -> list[str]:
 
 
 Mistake = tuple[str, str, str]
-"""The wrong key, such as ``spline.knots`` or ``path[2].blend``, the problem, and what is allowed."""
+"""The wrong key, such as ``spline.knots`` or ``path[2].blend``, the problem, and the allowed values."""
 
 
 class CheckedModel(Model):
-    """A model whose keys may contradict each other."""
+    """A model that is checked for contradictions between its keys."""
 
     def _mistakes(self) -> Iterator[Mistake]:
-        """Yield contradictions between keys, of which the first is reported."""
+        """Yield the contradictions between keys; only the first one is reported."""
         yield from ()
 
     @model_validator(mode="after")
@@ -133,7 +134,7 @@ class CheckedModel(Model):
 
 
 def describe_fields(model: type) -> dict[str, str]:
-    """Return the descriptions of a model's or dataclass's fields, from `Field` or from the docstrings below them."""
+    """Return the descriptions of the fields of a model or dataclass, from `Field` or from docstrings below them."""
     descriptions: dict[str, str] = {}
     for base in model.__mro__[::-1]:
         descriptions |= _docstrings_in(base.__module__).get(base.__name__, {})
@@ -145,12 +146,12 @@ def describe_fields(model: type) -> dict[str, str]:
 
 @cache
 def _docstrings_in(module: str) -> dict[str, dict[str, str]]:
-    """Return the docstrings below the fields in one of our modules, by class and by field."""
+    """Return the docstrings below the fields in a module of brachis, by class and by field."""
     if not module.startswith("brachis."):
         return {}
     try:
         source = inspect.getsource(sys.modules[module])
-    except OSError:  # installed without source
+    except OSError:  # the source is not installed
         return {}
     tree = ast.parse(source)
     classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
@@ -174,16 +175,16 @@ _NUMBER_AND_UNIT = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class WithUnit:
-    """Allows a number with a unit, such as ``0.05 mm``, in a task and in its JSON schema.
+    """Annotation that allows a number with a unit, such as ``0.05 mm``, in a task and in its JSON schema.
 
     Attributes
     ----------
     units : mapping of str to float
-        Factors to the unit of numbers without a unit.
+        Factors that convert each unit to that of a number without a unit.
     example : str
-        Example for messages.
+        Example of a value, for messages.
     pattern : str
-        Regular expression for the JSON schema.
+        Regular expression of allowed strings, for the JSON schema.
     """
 
     units: Mapping[str, float]
@@ -199,7 +200,7 @@ class WithUnit:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Allow a string as an alternative to the number."""
+        """Allow a string as an alternative to a number."""
         text = {"type": "string", "pattern": self.pattern}
         return {"anyOf": [handler(schema), text]}
 
@@ -213,12 +214,12 @@ class WithUnit:
                 found=value,
                 allowed=f"a number with a unit ({', '.join(self.units)}), such as {self.example}, or a number",
             )
-        # Dividing gives 0.07 for 7 %, and not 0.07000000000000001.
+        # Division gives 0.07 for 7 %, but multiplication would give 0.07000000000000001.
         return float(match[1]) / (1.0 / self.units[match[2]])
 
 
 def _check_version(version: object) -> object:
-    # In Python true == 1, so that a literal alone would accept `brachis: true`.
+    # In Python true == 1, so a literal alone would accept `brachis: true`.
     if type(version) is not int:
         raise refuse(
             "the version of the format must be a whole number",
@@ -234,7 +235,7 @@ Version = Annotated[Literal[1], BeforeValidator(_check_version)]
 Number = Annotated[float, Strict(), Field(ge=-LARGEST, le=LARGEST)]
 AnyPositive = Annotated[float, Strict(), Field(gt=0)]
 AnyNonNegative = Annotated[float, Strict(), Field(ge=0)]
-# Numbers of drives have no upper limit here: the robot checks them and names their joints.
+# Figures of drives have no upper limit here, because the robot checks them and names the joints.
 Positive = Annotated[AnyPositive, Field(le=LARGEST)]
 NonNegative = Annotated[AnyNonNegative, Field(le=LARGEST)]
 Count = Annotated[int, Strict()]
@@ -250,11 +251,11 @@ Vector = NonEmpty[Number]
 def plain(
     value: Any, sequence: type[list[object] | tuple[object, ...]] = list
 ) -> object:
-    """Return `value` with arrays and sequences as `sequence`, array scalars as numbers, and path objects as strings.
+    """Return `value` with arrays and sequences converted to `sequence`, array scalars to numbers, and paths to strings.
 
-    Numbers with names, such as a row of a pandas table, become a mapping, because they may be in any order.
+    Named numbers, such as a row of a pandas table, become a mapping, because their order may be arbitrary.
     """
-    # An array is recognised by its method and not by its class, so that this module does not need NumPy.
+    # An array is recognised by its method, so that this module does not need NumPy.
     if hasattr(value, "tolist"):
         names = list(value.keys()) if hasattr(value, "keys") else []
         value = value.tolist()
@@ -268,7 +269,7 @@ def plain(
 
 
 def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge mappings key by key; all other values of `changes` replace those of `content`.
+    """Merge mappings key by key. All other values of `changes` replace those of `content`.
 
     ``path_start`` is replaced as a whole, because its orientation may be in a different convention.
     """
@@ -294,21 +295,21 @@ def refuse(
     Parameters
     ----------
     problem : str
-        What is wrong.
+        Description of the mistake.
     key : str, optional
         Key below the validated value, for example ``"[2].blend"`` or ``"degree"``.
     found : object, optional
         The wrong value; None if a value is missing.
     allowed : str, optional
-        What would have been accepted.
+        Values that would have been accepted.
     """
-    # Pydantic fills the braces of the template from the context, in which messages find these facts.
+    # Pydantic fills the braces of the template from the context, which also carries these facts to the messages.
     facts = {"problem": problem, "key": key, "found": found, "allowed": allowed}
     return PydanticCustomError(REFUSED, "{problem}", facts)
 
 
 def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) -> None:
-    """Refuse names that are not known; `uses` has them by key, and values that are not names pass."""
+    """Refuse undefined names; `uses` contains the names by key, and values that are not names are accepted."""
     for key, name in uses.items():
         if isinstance(name, str) and name not in known:
             raise refuse(
@@ -320,7 +321,7 @@ def check_defined(kind: str, uses: Mapping[str, Any], known: Collection[str]) ->
 
 
 def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterValidator:
-    """Return a validator that refuses values for which `holds` is false, with a problem and what is allowed."""
+    """Return a validator that refuses values for which `holds` is false; its error states the allowed values."""
 
     def check(value: Any) -> Any:
         if not holds(value):
@@ -332,7 +333,7 @@ def must(holds: Callable[[Any], object], problem: str, allowed: str) -> AfterVal
 
 @dataclass(frozen=True)
 class ByForm:
-    """Chooses the member of a union by the form of the value: a word, a number, a list, a mapping or null.
+    """Annotation that selects the member of a union by the form of the value: word, number, list, mapping or null.
 
     Attributes
     ----------
@@ -345,7 +346,7 @@ class ByForm:
     def __get_pydantic_core_schema__(
         self, union: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Tag every member of the union with its form."""
+        """Tag each member of the union with its form."""
         members = {_form_of_type(member): member for member in get_args(union)}
         word = members.get("<word>")
         words = get_args(word) if get_origin(word) is Literal else ()
@@ -368,7 +369,7 @@ class ByForm:
 
 @dataclass(frozen=True)
 class ByKey:
-    """Chooses the member of a union of models by the keys that each model requires.
+    """Annotation that selects the member of a union of models by the keys that each model requires.
 
     Attributes
     ----------
@@ -381,7 +382,7 @@ class ByKey:
     def __get_pydantic_core_schema__(
         self, union: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Tag every model of the union with its name."""
+        """Tag each model of the union with its name."""
         members = {f"<{model.__name__}>": model for model in get_args(union)}
         required = {tag: required_keys(model) for tag, model in members.items()}
 
@@ -442,4 +443,4 @@ _FORMS: Final[dict[Any, str | None]] = {
     (list, tuple): "<list>",
     (Mapping, BaseModel): "<mapping>",
 }
-"""Tags of the forms of values, by their types."""
+"""Tags for the forms of values, by type."""

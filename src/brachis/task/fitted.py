@@ -1,4 +1,4 @@
-"""Segments along points, from files and arrays: a spline through all of them, or smooth curves within a tolerance."""
+"""Segments along points from files and arrays: a spline through all points, or smooth curves within a tolerance."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ from brachis.task.segments import (
 )
 
 _HAS_UNIT = re.compile(r"[_ (\[](deg|degrees|mm|cm)[)\]]?$", re.IGNORECASE)
-"""Ending of the header of a column whose numbers are in neither rad nor m."""
+"""Ending of a column name that states a unit other than rad or m."""
 
 
 def segments_along(
     points: Points, segment: CsvSegment, where: str
 ) -> list[SplineSegment | BSplineSegment]:
-    """Return the segments along points, which start at the first point.
+    """Return the segments along points, beginning at the first point.
 
     Parameters
     ----------
     points : Points
     segment : CsvSegment
-        Settings of the path along them. Its file is the user's name of the points.
+        Settings of the path along the points. Its file is the user's name for the points.
     where : str
-        Key of the task that names them, for messages.
+        Key of the task that names the points, for messages.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def segments_along(
         sections, report = fit_curves(points, settings.tolerance, stops=stops)
     elif points.speed is not None and segment.speed is None:
         raise TaskError(
-            "feed rates need a fitted path",
+            "feed rates need a path fitted within a tolerance",
             found="feed rates",
             allowed="feed rates together with a tolerance",
             where=where,
@@ -98,12 +98,12 @@ def segments_along(
                 "fit": fit,
             }
             segments.append(BSplineSegment(**keys))
-        fit = None  # only the first one has it
+        fit = None  # only the first segment has the report
     return segments
 
 
 def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
-    """Return the keys of the file's segment that hold for the last curve along it."""
+    """Return the keys of a file segment that apply to the last curve of the file."""
     shared = ("orientation", "speed", "blend", "stop", "dwell")
     return {key: getattr(segment, key) for key in shared}
 
@@ -111,9 +111,9 @@ def _shared_keys(segment: CsvSegment) -> dict[str, Any]:
 def _spline_through(
     points: Points, fit: FitReport | None, settings: PointFile
 ) -> SplineThrough:
-    """Return the spline through the points of one section of a file; only the first section has the report, `fit`.
+    """Return the spline through the points of one section of a file; `fit` is None except for the first section.
 
-    After a corner the waypoints begin with the corner, so that the spline passes the next point however close it is.
+    After a corner, the waypoints begin with the corner itself, so that the spline also passes a very close next point.
     """
     first = 1 if fit else 0
     keys: dict[str, Any] = {"relative": settings.relative, "fit": fit}
@@ -126,7 +126,7 @@ def _spline_through(
 
 
 def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
-    """Refuse corners if the task forbids them, and turns that would have to continue across them.
+    """Refuse corners if the task forbids them, and turns that would have to continue across corners.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
             found=report.listed_corners,
             allowed="no corners",
             where=f"{where}.corner",
-            hint="Set corner: blend to round them within the tolerance, or corner: stop to stop there",
+            hint="Set corner: blend to round the corners within the tolerance, or corner: stop to stop at them",
         )
     if isinstance(segment.orientation, Rotate | TurnTo):
         raise TaskError(
@@ -153,7 +153,7 @@ def _check_corners(report: FitReport, segment: CsvSegment, where: str) -> None:
 
 
 def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
-    """Return the task in which curves replace every segment from a file.
+    """Return the task with every file segment replaced by curves.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
     source : str
         File name or other origin of the task, for messages.
     folder : Path
-        Folder to which the paths of files are relative.
+        Folder to which file names are relative.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
 def _read(
     segment: CsvSegment, rows: Rows, where: str, folder: Path
 ) -> list[SplineSegment | BSplineSegment]:
-    """Return the segments along the points of a file; `rows` are the task space's."""
+    """Return the segments along the points of a file; `rows` are the rows of the task space."""
     path = folder / segment.csv.file
     text = read_text(
         path,
@@ -211,24 +211,25 @@ def _read(
 def _along_joints(
     segment: CsvSegment, text: str, path: Path, where: str
 ) -> SplineSegment:
-    """Return the spline through all rows of a file with a column for each joint, in rad and m."""
+    """Return the spline through all rows of a file that has a column for each joint, in rad or m."""
     settings = segment.csv
     usual = PointFile(file=settings.file)
     for key in ("orientation", "units", "tolerance", "corner"):
         if getattr(settings, key) != getattr(usual, key):
             raise TaskError(
-                "this key does not apply to a path of joints, which passes all rows, in rad and m",
+                "this key does not apply to a joint path, which passes through all rows, in rad and m",
                 allowed=f"no {key}",
                 where=f"{where}.csv.{key}",
             )
     table = read_table(text, str(path), "the names of the joints")
-    if all(_HAS_UNIT.search(column) for column in table.header):  # one may be a name
+    # A single match may be the name of a joint.
+    if all(_HAS_UNIT.search(column) for column in table.header):
         raise TaskError(
-            "a path of joints is in rad and m",
+            "a joint path is in rad and m",
             found=f"columns {', '.join(table.header)}",
             allowed="the names of the joints, without a unit",
             where=table.where,
-            hint="Convert the numbers to rad and m, and name the columns as the joints",
+            hint="Convert the numbers to rad and m, and name the columns like the joints",
         )
     _check_count(len(table.values), path)
     nothing = table.values[:, :0]
@@ -246,7 +247,7 @@ def _along_joints(
 def _check_count(rows: int, path: Path) -> None:
     if rows < 2:
         raise TaskError(
-            "a path needs its start and at least one waypoint",
+            "a path needs a start and at least one waypoint",
             found=f"{write_count(rows, 'row')} of numbers",
             allowed="2 or more",
             where=str(path),
@@ -269,24 +270,25 @@ def fit_path(
     Parameters
     ----------
     points : array_like, (n, p) or (n, 4, 4), or sequence of transforms
-        Positions in the rows of the task space; or homogeneous matrices; or objects with such a matrix: Pinocchio's
-        ``SE3``, or SciPy's ``RigidTransform``.
+        Positions, in the rows of the task space; homogeneous matrices; or objects that have such a matrix, such as
+        Pinocchio's ``SE3`` or SciPy's ``RigidTransform``.
     tolerance : mapping or FitTolerance, optional
-        ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file. By default the path passes all points.
+        ``{"position": "0.05 mm", "orientation": "0.1 deg"}`` as in a task file. By default the path passes through all
+        points.
     orientations : Rotation, or array_like, (n, 3, 3) or (n,), optional
         Orientations of the tool at the positions: SciPy rotations (``Rotation.from_quat(q)`` takes quaternions x, y, z,
         w), rotation matrices, or yaw angles.
     speed : float or array_like, (n,), optional
-        One number is a process speed, which is held along the whole path. An array contains the largest speed on the
-        way to each point, NaN if none is prescribed; it needs a tolerance.
+        A single number is a process speed, held along the whole path. An array contains the maximum speed on the way to
+        each point, or NaN if none is prescribed. An array requires a tolerance.
     units : mapping or FileUnits, optional
         ``{"length": "mm", "angle": "deg", "speed": "mm/min"}``. By default m, rad (for yaw) and m/s.
     corner : {"blend", "refuse", "stop"}, optional
         As in a task file.
     orientation : optional
-        How the tool turns along the path if no orientations are given, as in a task file.
+        How the tool turns along the path, as in a task file, if no orientations are given.
     relative : bool, optional
-        Whether the path may start anywhere, as in a task file.
+        Whether the points are moved to the start of the segment, as in a task file.
 
     Returns
     -------

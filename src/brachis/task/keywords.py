@@ -1,4 +1,4 @@
-"""Tasks from keywords: the keys of a task file, without its sections, for programs."""
+"""Tasks defined by keywords in programs. The keywords are the keys of a task file, without its sections."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Settings = Mapping[str, Any]
 
 
 class RobotKeywords(TypedDict, total=False):
-    """Keys of the section ``robot`` of a task, except its files."""
+    """Keys of the ``robot`` section of a task, except the keys that name files."""
 
     tool_frame: str | None
     tool_offset: Placement | Settings | Transform | None
@@ -50,10 +50,10 @@ class RobotKeywords(TypedDict, total=False):
 
 
 class TaskKeywords(RobotKeywords, total=False):
-    """Keys of a task; keys of its sections ``robot``, ``boundary``, ``spline`` and ``search`` need no section.
+    """Keys of a task. Keys of its sections ``robot``, ``boundary``, ``spline`` and ``search`` need no section.
 
-    A posture may be an array, a list or a mapping by joint name. A path may be one segment, or an array of points
-    (n, m), of which the first one is the start of the path.
+    A posture may be an array, a list or a mapping by joint name. A path may be a single segment, or an array of points
+    (n, m) whose first point is the start of the path.
     """
 
     path: (
@@ -96,7 +96,7 @@ class TaskKeywords(RobotKeywords, total=False):
     seed: int
     least_motion: bool
     slower: float | str
-    # whole sections, for the keys that stand in several of them
+    # whole sections, for keys that occur in several sections
     robot: RobotSettings | Settings
     boundary: BoundarySettings | Settings
     spline: SplineSettings | Settings
@@ -120,14 +120,15 @@ _SECTION_OF = {
 def task_with(
     source: Source | None = None, /, **keywords: Unpack[TaskKeywords]
 ) -> Task:
-    """Return a task made from keywords, or a given task with some keys changed.
+    """Return a task made from keywords, or a copy of a task with some keys changed.
 
     Parameters
     ----------
     source : path-like, mapping or Task, optional
         The task to change; see `load_task`.
     **keywords
-        See `TaskKeywords`. Mappings are merged with those of `source` key by key; all other values replace its values.
+        See `TaskKeywords`. Mappings are merged with those of `source` key by key. All other values replace the values
+        in `source`.
 
     Raises
     ------
@@ -165,15 +166,15 @@ def task_with(
 def check_keywords(
     keywords: Iterable[str], where: str = "plan", arguments: Sequence[str] = ()
 ) -> None:
-    """Refuse unknown keywords; the message says where a key of this name belongs, or which keyword is meant.
+    """Refuse unknown keywords; the message says where the key belongs, or which keyword may be meant.
 
     Parameters
     ----------
     keywords : iterable of str
     where : str, optional
-        The function that takes them.
+        Name of the function that takes the keywords.
     arguments : sequence of str, optional
-        Names of its other arguments.
+        Names of the other arguments of the function.
 
     Raises
     ------
@@ -192,7 +193,7 @@ def check_keywords(
         name,
         sorted((*known, *arguments)),
         where=where,
-        hint=hint and f"This name is a key inside another keyword: {hint}",
+        hint=hint and f"This is a key inside another keyword: {hint}",
     )
 
 
@@ -207,7 +208,7 @@ def _as_keyword(names: Sequence[str]) -> str:
 
 
 def _in_full(key: str, value: object) -> object:
-    """Return a posture, or a solver given by name, in the form of a task file."""
+    """Return the value of a keyword as in a task file, where postures and solver names have a longer form."""
     if key == "solver":
         return expand_solver_name(value)
     if key not in {"start", "end"} or isinstance(value, str | Model):

@@ -1,7 +1,7 @@
-"""The table of the kinds of joint limits, read by task models, robot, limits, verification, messages and plots.
+"""The table of kinds of joint limits, used by task models, robot, limits, verification, messages and plots.
 
 A new kind of joint limit is a row of `LIMIT_KINDS`, its keyword in `LimitKeywords`, a class in `brachis.limits.joint`
-and a formula in `brachis.verify.limits.joint`. A limit on one figure of the whole robot is a row of `ROBOT_LIMITS`, its
+and a formula in `brachis.verify.limits.joint`. A new kind of limit on the whole robot is a row of `ROBOT_LIMITS`, its
 keyword, a class in `brachis.limits.drives` that `brachis.limits` lists, and a formula.
 """
 
@@ -18,38 +18,38 @@ from brachis.task.fields import AnyPositive, Model
 
 
 class Array(Protocol):
-    """A NumPy array or scalar, for this package, which does not import NumPy here."""
+    """A NumPy array or scalar, described by one method, because this module does not import NumPy."""
 
     def tolist(self) -> Any:
-        """Return plain numbers."""
+        """Return the value as plain numbers."""
 
 
 PerUnit = dict[str, float]
-"""A number for revolute joints, ``rad``, and another for prismatic joints, ``m``."""
+"""A number for revolute joints, ``rad``, and one for prismatic joints, ``m``."""
 
 
 @dataclass(frozen=True)
 class UsualLimit:
-    """Usual sizes of the limits of one kind; a larger limit was probably written in a different unit.
+    """Usual magnitudes of limits of one kind; a larger limit was probably written in a different unit.
 
     Attributes
     ----------
     mistaken_unit : dict of str to str
-        Unit in which larger limits were probably written, by the unit of the joint's position.
+        Unit in which a larger limit was probably written, by position unit of the joint.
     largest : dict of str to float
-        Largest usual limit of any robot.
+        Largest usual limit of any robot, by position unit of the joint.
     urdf_kind : str
-        Kind of limit of the URDF with which it is compared; empty for none.
+        Kind of limit in the URDF with which the limit is compared; empty for none.
     urdf_factor : float
         Largest usual ratio to the limit of the URDF.
     urdf_least : float
-        Limits below this are plausible whatever the URDF states.
+        Limits below this value are plausible, whatever the URDF states.
     compares_weight : bool
-        Whether it is compared with the torque needed to hold the arm.
+        Whether the limit is compared with the torque needed to hold the arm.
     overridden : bool
-        Whether the speed override scales it.
+        Whether the speed override scales limits of this kind.
     by_curve : bool
-        Whether a torque-speed curve replaces it.
+        Whether a torque-speed curve replaces limits of this kind.
     """
 
     mistaken_unit: dict[str, str]
@@ -71,15 +71,16 @@ class LimitKind:
     name : str
         Key below ``robot.limits``.
     units : dict of str to str
-        By the unit of the joint's position.
+        Units of the limit, by position unit of the joint.
     description : str
-        Of the key below ``robot.limits``.
+        Description of the key below ``robot.limits``.
     form : {"number", "pair", "range"}
-        A number > 0 for each joint, the same in both directions; also a pair [lower, upper] around zero; or a range.
+        Allowed values for a joint. ``number``: a number > 0 for both directions. ``pair``: such a number, or a pair
+        [lower, upper] around zero. ``range``: a range.
     scale : str
-        Limits on which the factor below ``robot.limits.scale`` acts, in words; empty for no factor.
+        Limits to which the factor below ``robot.limits.scale`` applies, in words; empty for no factor.
     urdf : str
-        Attribute of ``<limit>`` in a URDF that states it; empty for none.
+        Attribute of ``<limit>`` in a URDF that states the limit; empty for none.
     usual : UsualLimit or None
     needs_masses : bool
         Whether the quantity depends on the masses of the robot.
@@ -95,13 +96,13 @@ class LimitKind:
     needs_masses: bool = False
 
     def in_words(self, position_unit: str) -> str:
-        """Return the name of the quantity for a joint; the torque of a prismatic joint is called force."""
+        """Return the name of the limited quantity for a joint; the torque of a prismatic joint is called force."""
         words = self.name.replace("_", " ")
         return words if position_unit == "rad" else words.replace("torque", "force")
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Names of its arrays in `Limits`: one each for lower and upper limits, or one for both."""
+        """Names of the arrays of this kind in `Limits`: two for lower and upper limits, or one for both."""
         if self.form == "number":
             return (self.name,)
         return (f"{self.name}_lower", f"{self.name}_upper")
@@ -109,15 +110,15 @@ class LimitKind:
 
 @dataclass(frozen=True)
 class RobotLimit:
-    """A kind of limit on one figure of the whole robot, which needs its masses.
+    """A kind of limit on the whole robot, whose masses must be known.
 
     Attributes
     ----------
     unit : str
     description : str
-        Of the key below ``robot.limits``.
+        Description of the key below ``robot.limits``.
     scale : str
-        Key below ``robot.limits.scale`` of the factor that acts on it too; empty for none.
+        Key below ``robot.limits.scale`` of the factor that also applies to the limit; empty for none.
     """
 
     unit: str
@@ -126,7 +127,7 @@ class RobotLimit:
 
 
 FASTEST: Final[PerUnit] = {"rad": 60.0, "m": 50.0}
-"""Fastest usual speeds, rad/s or m/s: axes of small SCARA and delta robots reach 50 rad/s, and rails 10 m/s."""
+"""Largest usual speeds, rad/s or m/s: axes of small SCARA and delta robots reach 50 rad/s, and rails 10 m/s."""
 _ANY = {"rad": math.inf, "m": math.inf}
 _TORQUE = {"rad": "Nm", "m": "N"}
 _USUAL_TORQUE = UsualLimit(
@@ -137,7 +138,7 @@ _ROWS = (
     LimitKind(
         "torque",
         _TORQUE,
-        "Largest torque, N m (force, N).",
+        "Maximum torque, N m (force, N).",
         form="pair",
         scale="torque and force limits and torque-speed curves",
         urdf="effort",
@@ -147,7 +148,7 @@ _ROWS = (
     LimitKind(
         "velocity",
         {"rad": "rad/s", "m": "m/s"},
-        "Largest speed, rad/s (m/s).",
+        "Maximum speed, rad/s (m/s).",
         form="pair",
         scale="velocity limits",
         urdf="velocity",
@@ -163,9 +164,9 @@ _ROWS = (
     LimitKind(
         "acceleration",
         {"rad": "rad/s^2", "m": "m/s^2"},
-        "Largest acceleration, rad/s^2 (m/s^2).",
+        "Maximum acceleration, rad/s^2 (m/s^2).",
         scale="acceleration limits",
-        # Wrists of small robots accelerate with 200 rad/s^2, delta robots with 150 m/s^2.
+        # Wrists of small robots reach 200 rad/s^2, and delta robots 150 m/s^2.
         usual=UsualLimit(
             {"rad": "degrees per second^2", "m": "mm/s^2"}, {"rad": 500.0, "m": 300.0}
         ),
@@ -173,20 +174,20 @@ _ROWS = (
     LimitKind(
         "position",
         {"rad": "rad", "m": "m"},
-        "Range [low, high], rad (m). null stands for an open end.",
+        "Range [low, high], rad (m). null means an open end.",
         form="range",
     ),
     LimitKind(
         "power",
         {"rad": "W", "m": "W"},
-        "Largest mechanical power (torque x speed), drawn or returned, W.",
+        "Maximum mechanical power (torque x speed), drawn or returned, W.",
         scale="power limits, also total_power",
         needs_masses=True,
     ),
     LimitKind(
         "rms_torque",
         _TORQUE,
-        "Largest root mean square of the torque over the motion, N m (force, N), against heat in the motor.",
+        "Maximum root-mean-square torque over the motion, N m (force, N), to limit motor heating.",
         scale="limits of root-mean-square torques",
         usual=_USUAL_TORQUE,
         needs_masses=True,
@@ -194,27 +195,29 @@ _ROWS = (
     LimitKind(
         "jerk",
         {"rad": "rad/s^3", "m": "m/s^3"},
-        "Largest jerk, rad/s^3 (m/s^3).",
+        "Maximum jerk, rad/s^3 (m/s^3).",
         scale="jerk limits",
     ),
     LimitKind(
         "torque_rate",
         {"rad": "Nm/s", "m": "N/s"},
-        "Largest rate of change of the torque, N m/s (force, N/s).",
+        "Maximum rate of change of the torque, N m/s (force, N/s).",
         scale="limits of torque rates",
         needs_masses=True,
     ),
 )
 LIMIT_KINDS: Final = {row.name: row for row in _ROWS}
-"""By key below ``robot.limits``, in the order in which limits are built and checked."""
+"""Kinds of joint limits by key below ``robot.limits``, in the order in which limits are built and checked."""
 ROBOT_LIMITS: Final = {
     "total_power": RobotLimit(
-        "W", "Largest sum of all joints' powers, drawn or returned, W.", scale="power"
+        "W",
+        "Maximum sum of the powers of all joints, drawn or returned, W.",
+        scale="power",
     ),
 }
-"""Limits on one figure of the whole robot, by key below ``robot.limits``."""
+"""Limits on the whole robot, by key below ``robot.limits``."""
 
-# What a program may give: NumPy arrays stand for lists and numbers too.
+# Values that a program may pass; NumPy arrays are accepted as lists and numbers.
 _StatedPair = Array | Sequence[float | None] | None
 StatedLimit = (
     float
@@ -239,11 +242,11 @@ _Factors: Any = create_model("_Factors", __base__=Model, **_FACTORS)
 
 
 class LimitScale(_Factors):  # type: ignore[misc]
-    """Factors that reduce the limits as a safety margin: one for each row of `LIMIT_KINDS` except the position."""
+    """Factors that reduce limits as a safety margin: one for each kind in `LIMIT_KINDS` except the position."""
 
 
 class LimitKeywords(TypedDict, total=False):
-    """Arguments of `LimitSpec`: every row of `LIMIT_KINDS` and of `ROBOT_LIMITS`, and further ones."""
+    """Arguments of `LimitSpec`: a keyword for each row of `LIMIT_KINDS` and `ROBOT_LIMITS`, and further keywords."""
 
     torque: StatedLimit
     velocity: StatedLimit

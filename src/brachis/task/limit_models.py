@@ -3,10 +3,10 @@
 For ``torque``, ``velocity`` and ``position`` there are three cases. If the key is absent, the limit comes from the
 URDF. If it is null, the joint has no such limit. Otherwise it has a value. The models represent the absent key by
 `FROM_URDF`, which a task file may also spell out, so that absent and null stay different in comparisons and in saved
-tasks. A joint that a mapping leaves out keeps the limit of the URDF. A URDF states no ``acceleration``, ``jerk`` or
-``torque_rate``; if they are absent, there is no limit.
+tasks. A joint that a mapping leaves out keeps the limit of the URDF. A URDF does not state ``acceleration``, ``jerk``
+or ``torque_rate``; if such a key is absent, there is no limit.
 
-The module also has the limits on the motion of the tool.
+The module also contains the limits on the motion of the tool.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from brachis.task.limit_kinds import (
 )
 
 FROM_URDF: Final = "urdf"
-"""The value of a limit whose key is absent: the limit of the URDF holds."""
+"""The value of a limit whose key is absent: the limit of the URDF applies."""
 
 
 Interval = Annotated[
@@ -95,7 +95,7 @@ RangeEntry = Annotated[
 TorqueCurve = Annotated[
     tuple[tuple[NonNegative, NonNegative], ...], Field(min_length=2)
 ]
-"""Points [speed, torque]."""
+"""Points [speed, torque] of a torque-speed curve."""
 
 _FORMS = {"number": NumberEntry, "pair": PairEntry, "range": RangeEntry}
 _TabledLimits: Any = make_dataclass(
@@ -122,27 +122,28 @@ _TabledLimits: Any = make_dataclass(
 
 @dataclass(frozen=True)
 class LimitSpec(_TabledLimits):  # type: ignore[misc]
-    """Joint limits: with an absent key the URDF's limit holds, and null removes it (see the module's documentation).
+    """Joint limits. If a key is absent, the limit of the URDF applies; null removes it (see the module's text).
 
-    They are checked when a robot is made with them, because its joints are then known.
+    The limits are checked when a robot is made with them, because only then are its joints known.
 
     Parameters
     ----------
     torque, velocity : float, sequence, array, mapping or None, optional
-        Nm or N; rad/s or m/s. One number for all joints, one for each in chain order, or numbers by joint name. A pair
-        [lower, upper] around zero can replace the number of a joint. None, also for a single joint: no limit.
-        `FROM_URDF`: as in the URDF.
+        Limits in Nm or N, and in rad/s or m/s: one number for all joints, one for each joint in chain order, or numbers
+        by joint name. A pair [lower, upper] around zero can replace the number of a joint. None, also as the value of a
+        single joint: no limit. `FROM_URDF`: as in the URDF.
     position : sequence, array, mapping or None, optional
-        Pairs [lower, upper], rad or m, likewise. An end that is None is open.
+        Pairs [lower, upper], rad or m, in the same forms. None as an end means that the range is open there.
     acceleration, power, rms_torque, jerk, torque_rate : float, sequence, array, mapping or None, optional
-        rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; Nm/s or N/s. One number, several or None as for the torque.
-        Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at rest.
+        Limits in rad/s^2 or m/s^2; W; Nm or N; rad/s^3 or m/s^3; and Nm/s or N/s: a number, a sequence, a mapping or
+        None, as for the torque. Limits on jerk and torque rate need ``spline.degree`` >= 3 and zero acceleration at
+        rest.
     total_power : float or None, optional
-        Largest sum of the powers of all joints, W.
+        Maximum sum of the powers of all joints, W.
     scale : mapping or LimitScale, optional
         Factors on limits, applied last.
     torque_speed : mapping of str to (p, 2) array or sequence of pairs, optional
-        Points [speed, torque] by joint name.
+        Points [speed, torque] of a curve, by joint name.
 
     Examples
     --------
@@ -156,7 +157,7 @@ class LimitSpec(_TabledLimits):  # type: ignore[misc]
     torque_speed: dict[Name, TorqueCurve | None] | None = None
     """Torque limits that fall with speed, by joint name: points [speed, torque] at the joint, rad/s and N m (m/s and
     N), the first at speed 0. Torques never rise. The curve is linear between points, and its last slope continues to
-    zero torque. It holds in both directions, for driving and braking."""
+    zero torque. It applies in both directions, to driving and braking."""
 
     __pydantic_config__ = Model.model_config
 
@@ -174,7 +175,7 @@ class LimitSpec(_TabledLimits):  # type: ignore[misc]
 
 
 def without_defaults(limits: LimitSpec) -> dict[str, Any]:
-    """Return the limits that differ from the defaults."""
+    """Return only the limits that differ from their defaults."""
     usual = vars(LimitSpec())
     return {kind: value for kind, value in vars(limits).items() if value != usual[kind]}
 
@@ -192,7 +193,7 @@ def per_joint_values(
     InputError
         A list has the wrong length.
     UnknownNameError
-        A mapping names a joint that is not of the chain.
+        A mapping names a joint that is not in the chain.
     """
     if isinstance(value, Mapping):
         check_names("joint", value, names, key)
@@ -215,7 +216,7 @@ def map_by_joint(
     names: Sequence[str],
     missing: object,
 ) -> dict[str, object]:
-    """Return the values by joint name, without those that are `missing`; see `per_joint_values`."""
+    """Return the values by joint name, without values equal to `missing`; see `per_joint_values`."""
     values = per_joint_values(key, value, names, missing)
     pairs = zip(names, values, strict=True)
     return {name: joint_value for name, joint_value in pairs if joint_value != missing}
@@ -228,15 +229,15 @@ _PathCoordinates = Annotated[
 
 
 class SpeedTable(CheckedModel):
-    """Largest speed of the tool along the path, linear between path coordinates and constant before and after them.
+    """Maximum tool speed along the path, linear between the path coordinates and constant before and after them.
 
-    A step consists of two speeds at the same path coordinate, at which the lower of the two holds.
+    A step consists of two speeds at the same path coordinate; there the lower of the two applies.
     """
 
     s: Annotated[_PathCoordinates, Field(min_length=1)]
-    """Ascending path coordinates, 0 to 1. A coordinate given twice is a step."""
+    """Ascending path coordinates, 0 to 1. A coordinate that occurs twice is a step."""
     speed: Annotated[tuple[Speed, ...], BeforeValidator(plain)]
-    """Largest speed at each path coordinate, m/s."""
+    """Maximum speed at each path coordinate, m/s."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for row, (before, place) in enumerate(itertools.pairwise(self.s), 1):
@@ -262,16 +263,16 @@ class SpeedTable(CheckedModel):
 
 
 def _as_sequence(value: object) -> object:
-    """Return a list that contains one value, or the list that is given."""
+    """Return a list unchanged, and any other value as a list of one item."""
     value = plain(value)
     return value if isinstance(value, list) else [value]
 
 
 class ProcessSpeed(Model):
-    """A constant speed of the tool over a section of the path, such as a glue nozzle or a laser needs."""
+    """A constant speed of the tool over a section of the path, for example for a glue nozzle or a laser."""
 
     speed: Speed
-    """Speed of the tool frame's origin, m/s."""
+    """Speed of the origin of the tool frame, m/s."""
     s: Annotated[
         tuple[
             Annotated[Number, Field(ge=0.0, lt=1.0)],
@@ -284,18 +285,18 @@ class ProcessSpeed(Model):
         ),
     ]
     """[begin, end]: path coordinates between which the speed is held. At stops, and at ends of the path that the tool
-    does not pass at this speed, the section is shorter by a lead, the distance travelled in 0.1 s at the higher speed.
-    In a lead the tool is no faster than this speed, unless the speed on its other side is higher."""
+    does not pass at this speed, a lead shortens the section by the distance travelled in 0.1 s at the higher speed. In
+    a lead the tool is no faster than this speed, unless the speed beyond the lead is higher."""
     segment: Count | None = None
     """Index of the segment that states the speed; written by brachis."""
     within: tuple[Number, Number] | None = None
-    """[begin, end] between which the tool does not exceed the speed; written by brachis."""
+    """[begin, end] of the section in which the tool does not exceed the speed; written by brachis."""
     lead_length: Number = 0.0
-    """Length by which leads make the part shorter, m; written by brachis."""
+    """Length by which leads shorten the section, m; written by brachis."""
 
     @property
     def leads(self) -> list[SpeedTable]:
-        """Largest speeds in the lead-in and lead-out of the section."""
+        """Tables of the maximum speed in the lead-in and lead-out of the section."""
         if self.within is None:
             return []
         sides = ((self.within[0], self.s[0]), (self.s[1], self.within[1]))
@@ -304,29 +305,29 @@ class ProcessSpeed(Model):
 
     @property
     def origin(self) -> str:
-        """The segment that states the speed, in words for messages; empty if none does."""
+        """Segment that states the speed, in words for messages; empty if the speed is not from a segment."""
         return "" if self.segment is None else f" of path[{self.segment}].speed"
 
 
 class ToolLimits(CheckedModel):
-    """Limits on the motion of the tool itself, even where tolerances let it leave the path."""
+    """Limits on the actual motion of the tool, also where tolerances let the tool leave the path."""
 
     speed: Annotated[
         Speed | SpeedTable | None,
         ByForm("a number > 0, a table {s: [...], speed: [...]}, or null (no limit)"),
     ] = None
-    """Largest speed, m/s: a number, or a table {s: [...], speed: [...]} along the path."""
+    """Maximum speed, m/s: a number, or a table {s: [...], speed: [...]} along the path."""
     feed: tuple[SpeedTable, ...] = ()
-    """Tables of largest speeds; written by brachis from feed rates."""
+    """Tables of maximum speeds; written by brachis from feed rates."""
     acceleration: Speed | None = None
-    """Largest acceleration, m/s^2."""
+    """Maximum acceleration, m/s^2."""
     angular_speed: Speed | None = None
-    """Largest angular speed of the tool, without its free roll, rad/s."""
+    """Maximum angular speed of the tool, without its free roll, rad/s."""
     process_speed: Annotated[
         tuple[ProcessSpeed, ...], BeforeValidator(_as_sequence)
     ] = ()
-    """Sections of the path with a constant speed: {speed, s}, or a list of these in order, with gaps in which the speed
-    changes."""
+    """Sections of the path with a constant speed: {speed, s}, or a list of such sections in order, with gaps in which
+    the speed changes."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         for number, (before, section) in enumerate(
@@ -337,14 +338,14 @@ class ToolLimits(CheckedModel):
                 yield (
                     f"process_speed[{number}].s",
                     "the sections of the path overlap, meet or are out of order",
-                    f"a begin{section.origin} above {end:g}, the end of the one{before.origin} before it, with a gap",
+                    f"a begin{section.origin} above {end:g}, the end of the section{before.origin} before, with a gap",
                 )
         for number, section in enumerate(self.process_speed):
             cap = _least_between(self.speed, section.s)
             if cap is not None and cap < section.speed:
                 yield (
                     f"process_speed[{number}].speed",
-                    f"the tool's largest speed is below the process speed{section.origin}",
+                    f"the maximum tool speed is below the process speed{section.origin}",
                     f"at most {cap:g} m/s there, or a higher tool_limits.speed",
                 )
 
@@ -352,7 +353,7 @@ class ToolLimits(CheckedModel):
 def _least_between(
     cap: float | SpeedTable | None, interval: Sequence[float]
 ) -> float | None:
-    """Return the least of the largest speeds over a section of the path."""
+    """Return the lowest value of the maximum speed over a section of the path."""
     if not isinstance(cap, SpeedTable):
         return cap
     inside = [

@@ -1,4 +1,4 @@
-"""Joint limits from a separate file, such as the figures that a manufacturer publishes."""
+"""Joint limits from a separate file, for example the figures published by a manufacturer."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class LimitsFile(CheckedModel):
     source: Name
     """Origin of the figures."""
     joints: NonEmpty[Name]
-    """Joints whose limits the file states."""
+    """Names of the joints whose limits the file states."""
     limits: LimitSpec
-    """Limits as in robot.limits, without scale. A list is in the order of `joints`, and one number holds for all."""
+    """Limits as in robot.limits, without scale. A list is in the order of `joints`; a single number applies to all."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.limits.scale != LimitScale():
@@ -57,7 +57,7 @@ class LimitsFile(CheckedModel):
             )
 
     def by_kind(self, where: str) -> dict[str, Any]:
-        """Return the limits by kind and joint, and the figures of the whole robot; `where` names the file."""
+        """Return the joint limits by kind and joint, and the limits on the whole robot; `where` names the file."""
         return {
             kind: value
             if kind in ROBOT_LIMITS
@@ -73,14 +73,14 @@ _ROS_KINDS = {
     "jerk": ("jerk", ("max_jerk",)),
     "effort": ("torque", ("max_effort",)),
 }
-"""Kinds of limits in ROS: our names for them, and the keys of their values."""
+"""For each kind of limit in ROS, its name in brachis and the keys of its values."""
 _UR_JOINTS = {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"}
-"""Joints in files of Universal Robots, which may leave out the ending ``_joint`` of the names in the URDF."""
+"""Names of joints in files of Universal Robots, in which the ending ``_joint`` of the URDF names may be missing."""
 _SUFFIX = "_joint"
 
 
 class RosJointLimits(CheckedModel):
-    """Limits of one joint in the form of ROS, in SI units. A kind without figures and ``has_...`` is not stated."""
+    """Limits of one joint as in ROS, in SI units. A kind with neither figures nor ``has_...`` is not stated."""
 
     has_position_limits: Flag | None = None
     min_position: Number | None = None
@@ -109,7 +109,7 @@ class RosJointLimits(CheckedModel):
                     yield key, "out of range", f"> 0, or {switch}: false"
 
     def by_kind(self) -> dict[str, Any]:
-        """Return the stated limits by our kinds; None for a kind that is switched off."""
+        """Return the stated limits by their kinds in brachis; None for a kind that is switched off."""
         stated: dict[str, Any] = {}
         for kind, (name, keys) in _ROS_KINDS.items():
             figures = tuple(getattr(self, key) for key in keys)
@@ -121,18 +121,18 @@ class RosJointLimits(CheckedModel):
 
 
 class RosLimitsFile(Model):
-    """The content of a file ``joint_limits.yaml`` of MoveIt, ros2_control or Universal Robots."""
+    """The content of a ``joint_limits.yaml`` file of MoveIt, ros2_control or Universal Robots."""
 
     joint_limits: Annotated[dict[Name, RosJointLimits], Field(min_length=1)]
-    """Limits by joint: has_velocity_limits, max_velocity and so on."""
+    """Limits of each joint: has_velocity_limits, max_velocity and so on."""
     default_velocity_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Used as limits.scale.velocity if the task does not give it."""
+    """Value of limits.scale.velocity if the task does not state that factor."""
     default_acceleration_scaling_factor: Annotated[Positive, Field(le=1)] = 1.0
-    """Used as limits.scale.acceleration if the task does not give it."""
+    """Value of limits.scale.acceleration if the task does not state that factor."""
 
     @property
     def joints(self) -> dict[str, RosJointLimits]:
-        """Limits by the names that the joints have in the URDF."""
+        """Limits by joint name in the URDF."""
         short = {
             name.removesuffix(_SUFFIX): limits
             for name, limits in self.joint_limits.items()
@@ -142,7 +142,7 @@ class RosLimitsFile(Model):
         return self.joint_limits
 
     def by_kind(self, _where: str) -> dict[str, Any]:
-        """Return the limits by our kinds and by joint, and the factors on them."""
+        """Return the limits by kind in brachis and by joint, and the factors on them."""
         stated: dict[str, Any] = {}
         for name, limits in self.joints.items():
             for kind, value in limits.by_kind().items():
@@ -157,7 +157,7 @@ class RosLimitsFile(Model):
 
 
 def read_limits(path: str | os.PathLike[str]) -> LimitSpec:
-    """Return the limits that a file states, joint by joint; for all others the URDF's limits hold.
+    """Return the limits that a file states for each joint; limits that it does not state come from the URDF.
 
     Raises
     ------
@@ -184,16 +184,16 @@ def with_limits_of_file(
 ) -> Mapping[str, Any]:
     """Return the content of a task with the limits of its limits file merged into ``robot.limits``.
 
-    Limits of the task itself override those of the file, joint by joint if they name joints.
+    Limits in the task override those in the file. If they name joints, they override only the limits of these joints.
 
     Parameters
     ----------
     content : mapping
         A task, not checked yet.
     source : str
-        File name, or what else the task came from, for messages.
+        File name or other origin of the task, for messages.
     folder : Path
-        What the file's path is relative to.
+        Folder to which the path of the file is relative.
     """
     robot = content.get("robot")
     if not isinstance(robot, Mapping) or robot.get("limits_file") is None:
@@ -201,7 +201,7 @@ def with_limits_of_file(
     try:
         settings = RobotSettings.model_validate(plain(robot))
     except ValidationError:
-        return content  # the check of the task says what is wrong
+        return content  # the later check of the task reports the mistake
     task_limits = robot.get("limits") or {}
     if isinstance(task_limits, LimitSpec):
         task_limits = without_defaults(task_limits)

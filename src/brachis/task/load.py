@@ -1,6 +1,6 @@
-"""Loading a `Task` from a file or a mapping.
+"""Loading of a `Task` from a file or a mapping.
 
-Dotted keys of a task look like ``spline.intervals`` and ``path.0.line.by``, which messages write as
+Dotted keys of a task look like ``spline.intervals`` and ``path.0.line.by``. Messages write the latter as
 ``path[0].line.by``.
 """
 
@@ -38,7 +38,7 @@ _INDEX = re.compile(r"\[(\d+)\]")
 def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     """Set a dotted key in the content of a task, in place.
 
-    Mappings on the way that are absent or null are created. Whether a task has such a key is checked by `load_task`,
+    Mappings on the way to the key are created if they are absent or null. The key itself is checked by `load_task`,
     which lists the valid keys.
 
     Parameters
@@ -46,14 +46,14 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
     content : mutable mapping
         A task, not checked yet.
     key : str
-        Names and, in lists, indices from 0, joined by dots.
+        Names and, for lists, indices from 0, joined by dots.
     value : object
         The value, in the form of a task file.
 
     Raises
     ------
     TaskError
-        The key leads through a value without keys, or past the end of a list.
+        The key goes through a value that has no keys, or past the end of a list.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def set_key(content: MutableMapping[str, Any], key: str, value: object) -> None:
 
 
 def _step(place: object, name: str, before: list[str], key: str) -> str | int:
-    """Return the index for `place`: a name in a mapping, a number in a list."""
+    """Return the index into `place`: a name for a mapping, a number for a list."""
     if isinstance(place, MutableMapping):
         return name
     where = ".".join(before)
@@ -102,7 +102,7 @@ def _step(place: object, name: str, before: list[str], key: str) -> str | int:
 
 
 def read_assignment(text: str) -> tuple[str, object]:
-    """Read ``key=value``, the value as YAML.
+    """Read ``key=value``, with the value in YAML.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def read_assignment(text: str) -> tuple[str, object]:
 def with_keys(
     content: Mapping[str, Any], changes: Mapping[str, object]
 ) -> dict[str, Any]:
-    """Return the unchecked content of a task with dotted keys set; `content` itself stays unchanged."""
+    """Return a copy of the unchecked content of a task with some dotted keys set."""
     changed: Any = plain(content)
     for key, value in changes.items():
         set_key(changed, key, value)
@@ -135,9 +135,9 @@ def with_keys(
 
 
 Source = str | os.PathLike[str] | Mapping[str, object] | Task
-"""The input from which a task is loaded: its file or its content."""
+"""The input from which a task is loaded: a task file, its content, or a task."""
 LARGEST_TASK = 1_000_000
-"""Largest size of a task file, bytes; YAML of this size takes some 20 s to read."""
+"""Maximum size of a task file, bytes. Reading YAML of this size takes about 20 s."""
 
 
 def load_task(source: Source, *, changes: Mapping[str, object] | None = None) -> Task:
@@ -149,22 +149,22 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
         A YAML file, a mapping with the content of such a file (NumPy arrays are accepted as lists), or a task, which is
         returned unchanged unless there are changes.
     changes : mapping of str to object, optional
-        Values by dotted keys, such as ``{"spline.intervals": 40, "path.0.line.length": 0.5}``, that replace those of
-        `source`.
+        Values by dotted key that replace those of `source`, such as ``{"spline.intervals": 40, "path.0.line.length":
+        0.5}``.
 
     Returns
     -------
     Task
-        The validated task. The path of the URDF, given relative to the folder of the file or, for a mapping, to the
-        current folder, is made absolute. CSV files of waypoints and a limits file, relative to the same folder, are
-        read: the task contains splines and limits instead, and no longer needs the files.
+        The validated task. The path of the URDF is made absolute; it is relative to the folder of the file or, for a
+        mapping, to the current folder. CSV files of waypoints and a limits file, relative to the same folder, are read.
+        The task contains splines and limits instead, and no longer needs these files.
 
     Raises
     ------
     TaskError
-        The file cannot be read or is not YAML, or the task is wrong. One message lists the mistakes, the first twenty
-        on a line each: file, key, what was found and what is allowed. Or a CSV file or a limits file is wrong; the
-        message names the line or key.
+        The file cannot be read or is not YAML, or the task is wrong. One message lists the mistakes, with a line for
+        each of the first twenty: file, key, wrong value and allowed values. A wrong CSV file or limits file also raises
+        this error; its message names the line or key.
 
     Examples
     --------
@@ -205,12 +205,12 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
             where=str(path),
             found=str(error),
             allowed=f"a YAML file ({' or '.join(TASK_SUFFIXES)})",
-            hint="brachis new writes a first task",
+            hint="Run brachis new to write a first task",
         ) from error
     task = task_from(content, str(path), path.absolute().parent, changes or {})
     if task.robot.urdf is None:
         raise TaskError(
-            "a task file needs this key, and it is missing",
+            "this key is missing, but a task file needs it",
             where=f"{path}: robot.urdf",
             hint="Set it to the path of the URDF, relative to the task file",
         )
@@ -219,16 +219,16 @@ def load_task(source: Source, *, changes: Mapping[str, object] | None = None) ->
 
 @contextmanager
 def name_task_file(source: object, changes: Collection[str] = ()) -> Iterator[None]:
-    """Add the name of the task file to errors that are found later, in its robot, path or postures.
+    """Add the name of the task file to later errors in its robot, path or postures.
 
-    Errors of a URDF file, which name that file, and errors of a missing library stay unchanged.
+    Errors in a URDF file, which name that file, and errors about a missing library stay unchanged.
 
     Parameters
     ----------
     source : object
-        What the task was made from. If it is not a task file, errors stay unchanged.
+        Source of the task. If this is not a task file, errors stay unchanged.
     changes : collection of str, optional
-        Dotted keys that were set.
+        Dotted keys that were set in the task.
     """
     try:
         yield
@@ -249,7 +249,7 @@ def _name_source(source: str, changes: Collection[str]) -> str:
 
 
 def check_robot_settings(content: Mapping[str, object]) -> RobotSettings:
-    """Return the ``robot`` section of a task from a mapping.
+    """Return the ``robot`` section of a task, made from a mapping.
 
     Raises
     ------
@@ -271,7 +271,7 @@ def task_from(
     source : str
         Name of the content in messages.
     folder : Path
-        Folder to which its paths of files are relative.
+        Folder to which file names in the content are relative.
     changes : mapping
         Dotted keys to set.
 
@@ -281,7 +281,7 @@ def task_from(
         See `load_task`.
     """
     if not isinstance(content, Mapping):
-        return validate(Task, content, source)  # which refuses it
+        return validate(Task, content, source)  # which refuses the content
     if changes:
         content = with_keys(content, changes)
     source = _name_source(source, changes)
@@ -296,12 +296,12 @@ def task_from(
 
 
 def _with_start(task: Task, source: str) -> Task:
-    """Fill in the start of the path from its first segment if the task does not state it; for joints the start posture.
+    """Fill in the start of the path (for a joint path the start posture) from the first segment if it is missing.
 
     Raises
     ------
     TaskError
-        Neither states it, and the start posture is free.
+        Neither the task nor the segment states the start, and the start posture is free.
     """
     if task.start != "free" or task.path_start is not None:
         return task

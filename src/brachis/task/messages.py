@@ -1,4 +1,4 @@
-"""Pydantic's validation errors in plain words: the key, what was found, what is allowed, and what to try."""
+"""Pydantic's validation errors in plain words: the key, the wrong value, the allowed values, and a hint."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from brachis.task.units import unit_of
 
 _M = TypeVar("_M", bound=Model)
 _MOST_MISTAKES = 20
-"""Largest number of mistakes in one message, to fit on a screen. An array of strings could give thousands."""
+"""Maximum number of mistakes in a message, so that it fits on a screen. An array of strings could give thousands."""
 _Location = tuple[str | int, ...]
-"""Keys, indices and tags of unions on the way to a value, as pydantic gives them."""
+"""Location of a value as given by pydantic: keys, indices and tags of unions."""
 
 
 def validate(model: type[_M], content: object, source: str) -> _M:
-    """Return a model made from its content, in which arrays may stand for lists.
+    """Return a model made from its content, in which arrays are accepted as lists.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
     details = [
         detail for detail in error.errors(include_url=False) if not _is_echo(detail)
     ]
-    # The same mistake in several items of a list is one.
+    # The same mistake in several items of a list is reported once.
     mistakes = [
         [*places]
         for _, places in groupby(
@@ -83,7 +83,7 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
 
 
 def show(value: object) -> str:
-    """Return a value as a task file would write it, shortened, with its type if that may be the mistake."""
+    """Return a value as written in a task file, shortened, with its type if the type may be the mistake."""
     if isinstance(value, Model):
         value = value.model_dump()
     if value is None:
@@ -106,7 +106,7 @@ def _shorten(text: str) -> str:
 
 
 def _one(places: list[ErrorDetails], source: str, model: type[Model]) -> TaskError:
-    """Return the error for one mistake, which names the first of the places where it is made."""
+    """Return the error for one mistake; it names only the first place with this mistake."""
     detail, *others = places
     problem, *facts = _DESCRIPTIONS.get(detail["type"], _describe)(detail, model)
     key = _write_location(detail["loc"], detail.get("ctx", {}).get("key", ""))
@@ -131,7 +131,7 @@ def _names_in(location: _Location) -> list[str]:
 
 
 def _write_location(location: _Location, key: str) -> str:
-    """Return a location and a key below it in the form ``path[0].line.to``, without tags."""
+    """Return, without tags, a location and a key below it in the form ``path[0].line.to``."""
     keys = [
         f"[{step}]" if isinstance(step, int) else step
         for step in location
@@ -151,7 +151,7 @@ def models_in(annotation: object) -> Iterator[type]:
 
 
 def _fields_of(model: type) -> Mapping[str, object]:
-    """Return the annotations of the fields of a model or dataclass by their names."""
+    """Return the annotations of the fields of a model or dataclass, by field name."""
     if issubclass(model, Model):
         return {name: field.annotation for name, field in model.model_fields.items()}
     return get_type_hints(model)
@@ -172,7 +172,7 @@ def _models_at(location: _Location, model: type[Model]) -> list[type]:
                 inner
                 for annotations in fields
                 for inner in models_in(annotations.get(str(step)))
-            ]  # else it is a name in a mapping
+            ]  # otherwise the step is a name in a mapping
     return models
 
 
@@ -215,7 +215,7 @@ def _description_at(location: _Location, model: type[Model]) -> str | None:
 
 
 def _is_echo(detail: ErrorDetails) -> bool:
-    """Return whether a list seems too short only because pydantic does not count its wrong items."""
+    """Return whether a list only seems too short because pydantic does not count wrong items."""
     return (
         detail["type"] == "too_short"
         and len(detail["input"]) >= detail["ctx"]["min_length"]
@@ -223,14 +223,14 @@ def _is_echo(detail: ErrorDetails) -> bool:
 
 
 _Parts = tuple[str, *tuple[str | None, ...]]
-"""The problem, what was found, what is allowed, and what to try; the last ones may be absent."""
+"""The problem, the wrong value, the allowed values and a hint; the last ones may be absent."""
 
 
 def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
     if isinstance(detail["loc"][-1], int):
         return "the list is too short: this item is missing", show(detail["input"])
     about = _description_at(detail["loc"], model)
-    return "this key is required, and missing", None, None, about
+    return "this required key is missing", None, None, about
 
 
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
@@ -268,16 +268,16 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
 
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
-    """Describe a mistake by the tables; for a wrong type add the allowed keys and the description of the key."""
+    """Describe a mistake using the tables; for a wrong type, add the allowed keys and the description of the key."""
     shown = show(detail["input"])
     location = detail["loc"]
     if location and location[-1] == "[key]":
-        return "a name must be a string", shown, "a string, in quotes if need be"
+        return "a name must be a string", shown, "a string, in quotes if necessary"
     if detail["type"] in _TYPES:
         allowed = _TYPES[detail["type"]]
         keys = _keys_at(location, model) if allowed == _MAPPING else []
         if keys:
-            allowed += f" with keys out of {', '.join(keys)}"
+            allowed += f" with keys among {', '.join(keys)}"
         return "wrong type", shown, allowed, _description_at(location, model)
     problem, form = _PROBLEMS.get(detail["type"], (detail["msg"], ""))
     facts = detail.get("ctx", {})
@@ -298,14 +298,14 @@ _ALLOWED_AT: Final = {
     "search.jobs": "auto (all processors), or a whole number >= 1",
     "search.seed": "a whole number >= 0",
 }
-"""What is allowed at keys of a task whose type alone does not tell."""
+"""Allowed values of keys of a task whose type alone does not state them."""
 _KEYS_OF_OTHERS: Final = {
     "objective": "brachis always minimises the end time",
     "tool": "The frame that follows the path is robot.tool_frame",
-    "posture": "A posture is stated by its name: start: home, with postures: {home: [...]}",
+    "posture": "To use a named posture, write start: home and postures: {home: [...]}",
     "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
 }
-"""What to write in place of keys that brachis does not have."""
+"""Hints for keys that brachis does not have."""
 _MAPPING = "a mapping"
 _TYPES: Final = {
     "float_type": "a number",
@@ -318,7 +318,7 @@ _TYPES: Final = {
     "dataclass_type": _MAPPING,
     "none_required": "null",
 }
-"""The expected types, by pydantic's names of errors about types."""
+"""Expected types, by pydantic's name of the error."""
 _OUT_OF_RANGE = "out of range"
 _PROBLEMS: Final = {
     "finite_number": ("not a finite number", "a finite number"),
@@ -332,7 +332,7 @@ _PROBLEMS: Final = {
     "string_too_short": ("the string is empty", "a string of at least one character"),
     WRONG_FORM: ("wrong form", "{allowed}"),
 }
-"""The problem and what is allowed, with pydantic's facts in braces, by pydantic's names of errors."""
+"""Problem and allowed values, with pydantic's facts in braces, by pydantic's name of the error."""
 _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Parts]]] = {
     REFUSED: _refusal,
     WRONG_KEYS: _wrong_keys,
@@ -340,4 +340,4 @@ _DESCRIPTIONS: Final[dict[str, Callable[[ErrorDetails, type[Model]], _Parts]]] =
     "extra_forbidden": _unknown,
     "unexpected_keyword_argument": _unknown,
 }
-"""Functions for mistakes that need more than the tables, by pydantic's names of errors."""
+"""Functions for mistakes that need more than the tables, by pydantic's name of the error."""

@@ -1,7 +1,7 @@
-"""The task: what the planner is asked to do.
+"""The task: the input of the planner.
 
-`Task` mirrors the task file key by key. Create one with `brachis.task.load_task`, which reads files and mappings alike
-and reports mistakes as a `brachis.errors.TaskError` that names the key.
+`Task` has the same keys as the task file. Create a task with `brachis.task.load_task`, which reads files and mappings
+alike, and reports a mistake as a `brachis.errors.TaskError` that names the key.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 
 class PathInFrame(Model):
-    """A path given in a named frame."""
+    """A path that is given in a named frame."""
 
     frame: Name
     segments: Segments
@@ -108,7 +108,7 @@ class PathInFrame(Model):
 class Task(CheckedModel):
     """A task: a robot, a path for its tool, and settings of the planner.
 
-    The constructor raises pydantic's own errors; `brachis.task.load_task` puts them in plain words.
+    The constructor raises pydantic's own errors; `brachis.task.load_task` words them plainly.
 
     Examples
     --------
@@ -124,23 +124,23 @@ class Task(CheckedModel):
     """The robot, for example {urdf: robot.urdf} or {urdf: scara3}."""
     start: FreePosture
     """Posture at the start of the path: {joints: ...}, a name defined in postures, or free. With free, path_start is
-    required unless the path begins with a waypoint. A path of joints that begins with a waypoint needs no start."""
+    required unless the path begins with a waypoint. A joint path that begins with a waypoint needs no start."""
     path_start: PathStart = None
-    """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position:
-    [x, y, z], rpy_deg: [...]} or another convention; only the rows of the task space count. It must agree with the
-    start posture. Null: the tool's place in that posture, or the first waypoint."""
+    """Point at which the path begins: a list of all task coordinates (m, rad). For a pose, or with axis: {position: [x,
+    y, z], rpy_deg: [...]} or another convention; only the rows of the task space are used. It must agree with the start
+    posture. Null: the position of the tool in that posture, or the first waypoint."""
     end: FreePosture = "free"
-    """Posture at the end, given like start. Its tool must be at the end of the path to within 1e-6 m or rad; the
+    """Posture at the end, given like start. It must place the tool at the end of the path to within 1e-6 m or rad; the
     nearest posture on the path is used."""
     task_space: TaskSpace
-    """What the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z axis),
-    axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one of yaw,
-    pitch, roll (angle about the world's z, y or x axis, rad) or axis (direction of the tool's z axis)."""
+    """Coordinates that the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z
+    axis), axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one
+    of yaw, pitch, roll (angle about the world's z, y or x axis, rad) or axis (direction of the tool's z axis)."""
     path: Segments
-    """Segments in order; or a list of points, each with all task coordinates, for the spline through them. In a frame:
+    """List of segments; or a list of points, each with all task coordinates, for the spline through them. In a frame:
     {frame: NAME, segments: [...]}."""
     frames: dict[Name, FramePlacement] = Field(default={})
-    """Placements of frames, such as those of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
+    """Placements of frames, for example of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
         dict[Name, JointValues],
         must(
@@ -151,7 +151,7 @@ class Task(CheckedModel):
     ] = Field(default={})
     """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
-    """Name of the frame of path and path_start. Null: the world."""
+    """Frame in which path and path_start are given. Null: the world."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -166,18 +166,19 @@ class Task(CheckedModel):
     ] = ()
     """Bodies around the robot or carried by it, or {file: cell.yaml} (see docs/my_cell.md)."""
     collisions: CollisionSettings = Field(default_factory=CollisionSettings)
-    """Clearance, and the pairs of bodies that keep it."""
+    """Clearance, and the pairs of bodies to which it applies."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
-    """Ranges within which the tool may leave the path."""
+    """Tolerances within which the tool may leave the path."""
     margins: Margins = Field(default_factory=Margins)
-    """Distances to keep from singular postures and from the ends of joint ranges."""
+    """Margins to keep from singular postures and from the ends of joint ranges."""
     custom_limits: dict[Name, dict[str, JsonValue]] = Field(default={})
     """Parameters of limits that installed packages add, by kind (see docs/own_limit.md)."""
     redundant_joints: RedundantJoints = "auto"
-    """Joints whose motion is optimised. auto plans in charts, and tries closed forms until a motion is verified.
+    """Joints whose motion is optimised. auto: planning uses charts, and closed forms until a motion is verified.
     pose_free_roll adds a joint, tool_roll, which the list may leave out."""
     branch: Name = "auto"
-    """Label of the branch of the closed form. auto: the branch of the start posture; all branches with start: free."""
+    """Label of the branch of the closed form. auto: the branch of the start posture, or all branches with start:
+    free."""
     search: SearchSettings = Field(default_factory=SearchSettings)
     """Search for the fastest motion."""
     spline: SplineSettings = Field(default_factory=SplineSettings)
@@ -192,13 +193,13 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: implausible figures are errors. false: they are warnings. null: only a start or named posture that looks
-    like degrees is an error."""
+    """true: implausible figures cause errors. false: they cause warnings. null: only a start or named posture that
+    seems to be in degrees causes an error."""
 
     @model_validator(mode="before")
     @classmethod
     def _expand(cls, content: object) -> object:
-        """Give a path of joints a free start by default, and split a path given in a frame."""
+        """Give a joint path a free start by default, and split a path given in a frame."""
         if not isinstance(content, Mapping):
             return content
         if content.get("task_space") == "joints":
@@ -256,16 +257,14 @@ class Task(CheckedModel):
             return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
         if all(isinstance(row, list | int | float) for row in rows):
             raise refuse(
-                "a path cannot be made of these numbers"
-                if rows
-                else "there is no segment",
+                "these numbers do not form a path" if rows else "there is no segment",
                 found=rows,
                 allowed="at least one segment, such as {line: {by: [0, 0.4, 0]}}, or two points or more, [[...], ...]",
             )
         return path
 
     def joints_at(self, end: str) -> tuple[Any, str] | None:
-        """Return the joint positions at ``start`` or ``end`` and their key; None if the posture is free."""
+        """Return the joint positions at ``start`` or ``end`` and their key, or None if the posture is free."""
         posture = getattr(self, end)
         if isinstance(posture, Posture):
             return posture.joints, f"{end}.joints"
@@ -274,13 +273,13 @@ class Task(CheckedModel):
         return self.postures[posture], f"postures.{posture}"
 
     def posture_key(self, end: str) -> str:
-        """Return the key of the joint positions at ``start`` or ``end``; for a periodic motion the key of its start."""
+        """Return the key of the joint positions at ``start`` or ``end``; for a periodic motion that of the start."""
         stated = self.joints_at(end) or self.joints_at("start")
         return stated[1] if stated else f"{end}.joints"
 
     @property
     def _start_forms(self) -> str:
-        """The form of ``path_start`` in this task space, for messages."""
+        """Form of ``path_start`` in this task space, for messages."""
         if self.of_poses:
             return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
         if isinstance(self.task_space, tuple):
@@ -317,24 +316,24 @@ class Task(CheckedModel):
             if self.task_space == "joints":
                 yield (
                     "start",
-                    "a path of joints that does not begin with a waypoint needs a start posture",
+                    "a joint path that does not begin with a waypoint needs a start posture",
                     "{joints: [...]}",
                 )
             yield (
                 "path_start",
-                "with a free start posture, the start of the path is missing",
+                "the start posture is free, but the start of the path is missing",
                 self._start_forms,
             )
         if is_free and self.search.guesses == "numeric":
             yield (
                 "search.guesses",
-                "numeric inverse kinematics needs a posture to begin with, and start is free",
+                "numeric inverse kinematics needs a start posture, but start is free",
                 "lattice",
             )
         if has_path_start and self.of_poses and not is_pose:
             yield (
                 "path_start",
-                "a list does not state its convention, such as whether w of a quaternion comes first or last",
+                "a list does not state the convention of the orientation, for example whether w comes first or last",
                 self._start_forms,
             )
         if is_pose and not self.of_poses:
@@ -364,7 +363,7 @@ class Task(CheckedModel):
         if self.path_frame is not None:
             yield (
                 "path_frame",
-                "a path of joints cannot be in a frame",
+                "a joint path cannot be in a frame",
                 "null, with task_space: joints",
             )
         for key, default in (
@@ -376,7 +375,7 @@ class Task(CheckedModel):
             if attrgetter(key)(self) != default:
                 yield (
                     key,
-                    "a path of joints leaves no choice of postures",
+                    "a joint path leaves no choice of postures",
                     f"{default}, with task_space: joints",
                 )
 
@@ -408,7 +407,7 @@ class Task(CheckedModel):
             yield (
                 "spline.knots",
                 "free knots need a motion that starts and ends at rest",
-                "uniform, or a boundary at rest",
+                "uniform, or a motion that starts and ends at rest",
             )
         if self.boundary.periodic:
             if self.end != "free":
@@ -418,31 +417,31 @@ class Task(CheckedModel):
                     "free",
                 )
             return
-        # Both ends fix a value and the derivatives that vanish.
+        # Each end fixes a value and the derivatives that vanish.
         least = 2 * spline.vanishing + 3 - spline.degree
         if spline.intervals != "auto" and spline.intervals < least:
             yield (
                 "spline.intervals",
-                f"rest: {spline.rest} leaves splines of degree {spline.degree} no freedom with so few intervals",
+                f"rest: {spline.rest} leaves no freedom for splines of degree {spline.degree} with so few intervals",
                 f">= {least}, or auto",
             )
 
     @property
     def collision_mode(self) -> str:
-        """Treatment of collisions: ``avoid``, ``check`` or ``off``."""
+        """Treatment of collisions in this task: ``avoid``, ``check`` or ``off``."""
         if self.collisions.mode != "auto":
             return self.collisions.mode
         return "avoid" if self.scene else "off"
 
     @property
     def of_poses(self) -> bool:
-        """Whether the path prescribes an orientation of the tool or of its axis."""
+        """Whether the path prescribes the orientation of the tool or of its axis."""
         space = self.task_space
         return space in {"pose", "pose_free_roll"} or "axis" in space
 
     @property
     def start_place(self) -> StartPlace:
-        """Start of the path that the first segment states, in the form of `path_start`; None if it states none."""
+        """Start of the path as stated by the first segment, in the form of `path_start`; None if it states no start."""
         place, turn = self.path[0].start or (None, None)
         if place is None or not self.of_poses:
             return place
@@ -453,19 +452,19 @@ class Task(CheckedModel):
 
     @property
     def speed_unit(self) -> str:
-        """Unit of a speed along the path; along a path of joints the speed is the norm of their velocities."""
+        """Unit of a speed along the path; along a joint path the speed is the norm of the joint velocities."""
         return "rad/s (m/s)" if self.task_space == "joints" else "m/s"
 
     @property
     def fits(self) -> tuple[FitReport, ...]:
-        """Reports of the fits to points, one for each file or array from which the path was made."""
+        """Reports on the fits to points, one for each file or array of points in the path."""
         fits = (getattr(segment.shape, "fit", None) for segment in self.path)
         return tuple(fit for fit in fits if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the task as plain mappings, lists, numbers and strings.
 
-        All defaults are spelled out, so that the result keeps its meaning if a default changes.
+        All defaults are written out, so that the result keeps its meaning if a default changes.
         ``load_task(task.to_dict()) == task``.
         """
         return self.model_dump(mode="json")

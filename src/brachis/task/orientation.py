@@ -1,8 +1,8 @@
 """The orientation of the tool along a segment, as the task file states it, for task spaces of poses.
 
-``orientation`` stands beside the kind of the segment. It is ``fixed``, ``tangent``, ``{rotate: ...}``, ``{to: ...}`` or
-``{tangent: ...}``. A given orientation is that of the tool frame in the frame of the path, by default the world, in one
-of the conventions of `brachis.task.points.units`. Angles are in degrees if the key ends with ``_deg``, else in radians.
+The key ``orientation`` of a segment is ``fixed``, ``tangent``, ``{rotate: ...}``, ``{to: ...}`` or ``{tangent: ...}``.
+An orientation is that of the tool frame in the frame of the path, by default the world. It is written in one of the
+conventions of `brachis.task.points.units`. Angles are in degrees if the key ends with ``_deg``, otherwise in radians.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Direction = Annotated[
 Profile = Annotated[
     Literal["uniform", "smooth"],
     Field(
-        description="Rate of the angle along the segment. uniform: constant. smooth: zero at both ends."
+        description="Turning rate along the segment. uniform: constant. smooth: zero at both ends."
     ),
 ]
 
@@ -65,9 +65,9 @@ _DEGREES = "_deg"
 
 
 def _about(name: str) -> Any:
-    """Return the field of a convention, described by its meaning."""
+    """Return the field for a convention, with the meaning of the convention as its description."""
     convention = CONVENTIONS[name]
-    unit = ", rad" if name == "rotation_vector" else " (length 1, to 1 %)"
+    unit = ", rad" if name == "rotation_vector" else " (length 1 to within 1 %)"
     if convention.euler:
         unit = ", degrees"
     meaning = convention.meaning[0].upper() + convention.meaning[1:]
@@ -75,7 +75,7 @@ def _about(name: str) -> Any:
 
 
 class Attitude(Model):
-    """An orientation in exactly one of these conventions."""
+    """An orientation, written in exactly one of these conventions."""
 
     model_config = ConfigDict(
         json_schema_extra=lambda schema: schema.update(oneOf=_ONE_OF)
@@ -123,7 +123,7 @@ _ONE_OF: list[JsonValue] = [{"required": [key]} for key in Attitude.model_fields
 
 
 class Target(Attitude):
-    """An orientation at which a turn ends."""
+    """The orientation at which a turn ends."""
 
     profile: Profile = "uniform"
 
@@ -132,7 +132,7 @@ class ToolPose(Attitude):
     """A pose of the tool: its position, and its orientation in exactly one of these conventions."""
 
     position: Vector3
-    """x, y, z, m."""
+    """Position x, y, z, m."""
 
     @model_validator(mode="before")
     @classmethod
@@ -145,13 +145,13 @@ class ToolPose(Attitude):
 
 
 StartPlace = tuple[Number, ...] | ToolPose | None
-"""Start of a path: its task coordinates or a pose; None if the task leaves it open."""
+"""Start of a path: task coordinates or a pose; None if the task does not state it."""
 
 
 def poses_of(
     transforms: Any, source: str, orientations: Any = None
 ) -> list[tuple[list[float], dict[str, Any]]]:
-    """Return positions, m, and orientations in the form of a task file; `source` names the transforms in messages."""
+    """Return the positions, m, and the orientations in task-file form; `source` names the transforms in messages."""
     from brachis.task.point_data import FileUnits
     from brachis.task.points.points import points_from
 
@@ -161,30 +161,31 @@ def poses_of(
 
 
 class Transform(Protocol):
-    """A pose such as Pinocchio's ``SE3``."""
+    """An object that represents a pose, such as Pinocchio's ``SE3``."""
 
     @property
     def homogeneous(self) -> Any:
-        """Return the homogeneous matrix, (4, 4)."""
+        """Return the homogeneous matrix of the pose, (4, 4)."""
 
 
 class Rotation(Model):
     """A rotation about an axis."""
 
     axis: Direction
-    """Axis of the rotation, right-hand rule, of any length."""
+    """Axis of rotation (right-hand rule), of any length."""
     angle_deg: Number
-    """Angle, degrees, which may be negative or exceed 360."""
+    """Angle of rotation, degrees. It may be negative or exceed 360."""
     frame: Literal["path", "tool"] = "path"
-    """Frame of the axis: path (the world or path_frame) or tool."""
+    """Frame in which the axis is given: path (the world or path_frame) or tool."""
     profile: Profile = "uniform"
 
 
 class Tangent(Model):
-    """Turning with the tangent."""
+    """Turning of the tool with the tangent of the path."""
 
     up: Direction | None = None
-    """Direction in the path's frame that stays up for the tool. Null: the axis of an arc or circle, else z."""
+    """Direction, in the frame of the path, that stays up for the tool. Null: the axis of an arc or circle, otherwise
+    z."""
 
 
 class Rotate(Model):
@@ -195,17 +196,17 @@ class Rotate(Model):
 
 
 class TurnTo(Model):
-    """The tool turns to an orientation by the shortest way."""
+    """The tool turns the shortest way to an orientation."""
 
     to: Target
     """Orientation at the end of the segment."""
 
 
 class AlongTangent(Model):
-    """The tool turns with the tangent."""
+    """The tool turns with the tangent of the path."""
 
     tangent: Tangent
-    """The direction that stays up while the tool turns."""
+    """Direction that stays up while the tool turns."""
 
 
 Turning = Annotated[

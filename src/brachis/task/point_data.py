@@ -1,4 +1,4 @@
-"""Files of points, as the task file states them, and reports of the smooth curves fitted to the points."""
+"""Files of points as stated in the task file, and reports on the smooth curves fitted to the points."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OrientationWord = Annotated[
     Name,
     must(
         CONVENTIONS.__contains__,
-        "this convention of an orientation is unknown",
+        "this orientation convention is unknown",
         choices(),
     ),
     WithJsonSchema({"enum": list(CONVENTIONS)}),
@@ -39,27 +39,27 @@ class FileUnits(Model):
     """Units of the numbers in a file, unless a header such as ``x_mm`` states them."""
 
     length: Literal["m", "cm", "mm", "um", "in", "inch"] | None = None
-    """Unit of positions. Null: the header's unit, or m."""
+    """Unit of positions. Null: the unit in the header, or m."""
     angle: Literal["rad", "mrad", "deg"] | None = None
-    """Unit of yaw and orientations. Null: the header's unit, or rad; required for roll, pitch, yaw and angles of KUKA,
-    Staubli and Fanuc."""
+    """Unit of yaw and orientations. Null: the unit in the header, or rad. Required for roll, pitch, yaw and for angles
+    of KUKA, Staubli and Fanuc."""
     speed: Literal["m/s", "mm/s", "m/min", "mm/min", "in/min", "inch/min"] | None = None
-    """Unit of feed rates. Null: the header's unit, which is then required."""
+    """Unit of feed rates. Null: the unit in the header, which is then required."""
 
 
 class FitTolerance(Model):
-    """Largest distances of points from the path, with a unit (0.05 mm, 0.1 deg) or in m and rad."""
+    """Maximum deviations of points from the path, with a unit (0.05 mm, 0.1 deg) or in m and rad."""
 
     position: Length
-    """Largest distance of a point from the path."""
+    """Maximum distance of a point from the path."""
     orientation: Angle = ANGLES["deg"] / 10.0
-    """Largest angle between a given orientation or yaw and that of the path; by default 0.1 deg."""
+    """Maximum angle between a given orientation or yaw and that of the path; by default 0.1 deg."""
     corner: Length | None = None
-    """Largest distance at a rounded corner. Null: as position."""
+    """Maximum distance at a rounded corner. Null: as position."""
 
     @property
     def at_corners(self) -> float:
-        """Largest distance of a point from the path where a corner is rounded, m."""
+        """Maximum distance of a point from the path where a corner is rounded, m."""
         return self.corner or self.position
 
 
@@ -67,81 +67,81 @@ CornerMode = Literal["blend", "refuse", "stop"]
 
 
 class PointFile(Model):
-    """Points in a CSV or G-code file, which `brachis.task.load_task` reads and turns into a smooth curve."""
+    """Points in a CSV or G-code file; `brachis.task.load_task` reads them and turns them into a smooth curve."""
 
     file: Name
     """CSV or G-code file (.nc, .ngc, .gcode, .tap)."""
     relative: Flag = False
-    """Whether points are moved so that the first one is at the start of the segment."""
+    """Whether all points are moved so that the first one is at the start of the segment."""
     orientation: OrientationWord | None = Field(
         default=None,
-        description="Convention of the orientation columns, if their names leave it open: "
+        description="Convention of the orientation columns, if their names do not state it:  "
         f"{', '.join(CONVENTIONS)}.",
     )
     units: FileUnits = Field(default_factory=FileUnits)
     """Units of the numbers in the file."""
     tolerance: FitTolerance | None = None
-    """Largest distances of the points from the path: {position: 0.1 mm, orientation: 0.5 deg}. Null: the path passes
+    """Maximum deviations of the points from the path: {position: 0.1 mm, orientation: 0.5 deg}. Null: the path passes
     through all points."""
     corner: CornerMode = "blend"
-    """blend: corners are rounded within the tolerance. stop: the tool stops there. refuse: an error lists them. Only
-    stop finds corners without a tolerance."""
+    """blend: corners are rounded within the tolerance. stop: the tool stops at corners. refuse: an error lists them.
+    Without a tolerance, corners are found only with stop."""
 
 
 class FoundCorner(Model):
     """A corner found in the points."""
 
     row: Count
-    """Line in the file, or index in the array, of the nearest point."""
+    """Line of the nearest point in the file, or its index in the array."""
     angle: Number
-    """Change of direction, rad."""
+    """Change of direction at the corner, rad."""
     distance: Number
-    """Distance along the path from its first point, m."""
+    """Distance of the corner from the first point, along the path, m."""
     blend: NonNegative
-    """Length that its blend takes from either side, m; 0 if the tool stops."""
+    """Length that the blend cuts from either side, m; 0 if the tool stops."""
 
     def __str__(self) -> str:
-        """Return its angle and its row."""
+        """Return the angle and the row of the corner, as text."""
         return f"{degrees(self.angle):.3g} deg at row {self.row}"
 
 
 class FitReport(Model):
-    """The source of a curve and its distances from the points; written by brachis."""
+    """The source of a fitted curve and its distances from the points; written by brachis."""
 
     source: Name
-    """File, or name of the argument with the points."""
+    """File of the points, or name of the argument that contains them."""
     points: Count
     """Number of points."""
     length: NonNegative
     """Length of the path, m."""
     position_error: NonNegative = 0.0
-    """Largest distance of a point from the path, corners left out, m."""
+    """Largest distance of a point from the path, except at corners, m."""
     position_rms: NonNegative = 0.0
-    """Root mean square of the distances, m."""
+    """Root mean square of the distances of the points, m."""
     position_tolerance: NonNegative = 0.0
-    """Allowed distance, m; 0 if the path passes through all points."""
+    """Maximum allowed distance, m; 0 if the path passes through all points."""
     orientation_error: NonNegative = 0.0
-    """Largest angle between a given and the fitted orientation, rad."""
+    """Largest angle between a given orientation and the fitted one, rad."""
     orientation_tolerance: NonNegative = 0.0
-    """Allowed angle, rad."""
+    """Maximum allowed angle, rad."""
     intervals: Count
     """Number of knot intervals of all curves fitted to these points."""
     corners: tuple[FoundCorner, ...] = ()
-    """Corners, in order."""
+    """Corners, in the order of the path."""
     told: tuple[str, ...] = ()
     """Findings about the data, such as units and repeated rows."""
     doubt: str | None = None
-    """Remark on data that look implausible."""
+    """Remark on implausible data."""
     profile: tuple[tuple[Number, Number, Number], ...] = ()
-    """Rows [distance along the path, m, largest distance, m, and largest angle, rad, of the points there]."""
+    """Rows [distance along the path (m), largest distance (m) and largest angle (rad) of the points there]."""
 
     @property
     def listed_corners(self) -> str:
-        """List of the first ten corners."""
+        """Text that lists the first ten corners."""
         return name_first([str(corner) for corner in self.corners], ", ", count=10)
 
     def __str__(self) -> str:
-        """Return the report in one line, with lengths in mm."""
+        """Return the report as one line of text, with lengths in mm."""
         corners = "no corners"
         if self.corners:
             is_blended = any(corner.blend for corner in self.corners)

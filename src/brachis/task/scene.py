@@ -1,4 +1,4 @@
-"""The scene of a task: bodies around the robot or carried by it, files of bodies, and the clearance between them."""
+"""The scene of a task: bodies around the robot or carried by it, scene files, and the clearance between bodies."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from brachis.task.settings import Placement
 from brachis.task.yaml_reader import read_yaml
 
 SHAPES = ("box", "sphere", "cylinder", "capsule", "half_space", "mesh", "urdf")
-"""Keys of the shapes, of which a body has exactly one."""
+"""Keys of the shapes. A body has exactly one of these keys."""
 
 
 class Round(Model):
-    """A cylinder about its z axis, centred at the origin; also the cylindrical part of a capsule."""
+    """A cylinder about the z axis, centred at the origin, or the cylindrical part of a capsule."""
 
     radius: Positive
     """Radius, m."""
     length: Positive
-    """Length, for a capsule without its caps, m."""
+    """Length, m; that of a capsule excludes its caps."""
 
 
 class HalfSpaceShape(Model):
@@ -50,10 +50,10 @@ class HalfSpaceShape(Model):
 
 
 class SceneBody(CheckedModel):
-    """A body of one shape, fixed to the world or to a link of the robot, that the robot must not touch."""
+    """A body that the robot must not touch: one shape, fixed to the world or to a link of the robot."""
 
     name: Name | None = None
-    """Unique name. Null: its shape and its number."""
+    """Unique name. Null: shape and number of the body."""
     box: tuple[Positive, Positive, Positive] | None = None
     """Lengths along x, y and z, m."""
     sphere: Positive | None = None
@@ -61,33 +61,33 @@ class SceneBody(CheckedModel):
     cylinder: Round | None = None
     """Cylinder about z, centred at the origin: {radius: ..., length: ...}, m."""
     capsule: Round | None = None
-    """Capsule about z: like the cylinder, with round caps beyond its length, m."""
+    """Capsule about z: like cylinder, with round caps added to the length, m."""
     half_space: HalfSpaceShape | None = None
-    """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of it; offset is the distance from
-    the origin along the normal, m."""
+    """Space behind a plane: {normal: [x, y, z], offset: 0}. The normal points out of the body; offset is the distance
+    from the origin along the normal, m."""
     mesh: Name | None = None
     """Mesh file; its convex hull is used."""
     urdf: Name | None = None
     """URDF file of a cell without moving joints; its collision geometry is used."""
     scale: Positive = 1.0
-    """Factor from the mesh's unit to m."""
+    """Factor from the mesh unit to m."""
     link: Name | None = None
-    """Link of the robot that carries it. Null: it is fixed to the world."""
+    """Link of the robot that carries the body. Null: the body is fixed to the world."""
     frame: Name | None = None
-    """Name of the frame in which it is placed. Null: the world."""
+    """Frame in which the body is placed. Null: the world."""
     position: Vector3 = (0.0, 0.0, 0.0)
-    """Position of its origin in the world, its frame or its link, m."""
+    """Position of the body origin in the world, frame or link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw, degrees."""
 
     @property
     def shape(self) -> str:
-        """Key of the body's shape."""
+        """Key of the shape that the body has."""
         return next(key for key in SHAPES if getattr(self, key) is not None)
 
     @property
     def size(self) -> float:
-        """Largest length that the shape states, m; 0 for a mesh or a URDF."""
+        """Largest length stated for the shape, m; 0 for a mesh or a URDF."""
         shape = getattr(self, self.shape)
         if isinstance(shape, Round):
             return max(shape.radius, shape.length)
@@ -122,33 +122,33 @@ class SceneBody(CheckedModel):
             if any(getattr(self, key)):
                 yield (
                     key,
-                    "a half-space is placed by its plane alone",
+                    "the position of a half-space is given only by its plane",
                     "normal and offset in half_space",
                 )
 
 
 class CollisionSettings(Model):
-    """The clearance, and the pairs of bodies that keep it."""
+    """The clearance, and the pairs of bodies to which it applies."""
 
     clearance: NonNegative = 0.01
-    """Least distance between bodies, m."""
+    """Minimum distance between bodies, m."""
     mode: Literal["auto", "avoid", "check", "off"] = "auto"
-    """avoid: the plan keeps the clearance, without a scene between the robot's own links. check: only the verification
-    checks it. off: distances are ignored. auto: avoid with a scene, else off."""
+    """avoid: the plan keeps the clearance; without a scene, only between links of the robot. check: only the
+    verification checks it. off: distances are ignored. auto: avoid if there is a scene, otherwise off."""
     self_collision: Flag = True
-    """Whether the clearance also holds between the links of the robot."""
+    """Whether the clearance also applies between links of the robot."""
     disable: tuple[tuple[Name, Name], ...] = ()
     """Pairs of links or bodies that may touch."""
     srdf: Name | None = None
-    """SRDF file whose disabled pairs may also touch."""
+    """SRDF file; the pairs that it disables may also touch."""
     padding: dict[Name, NonNegative] = Field(default={})
-    """Margins added to the bodies of links, by link, m."""
+    """Margin added to the bodies of each link, by link name, m."""
     capsules: Literal["none", "auto"] = "none"
-    """auto: put capsules along the links of a robot without collision geometry."""
+    """auto: links are covered with capsules if the robot has no collision geometry."""
 
 
 def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
-    """Name unnamed bodies by their shape and number, and refuse two bodies with the same name."""
+    """Name unnamed bodies by shape and number, and refuse bodies with the same name."""
     named = tuple(
         body.model_copy(update={"name": body.name or f"{body.shape} {number}"})
         for number, body in enumerate(scene)
@@ -157,18 +157,18 @@ def name_bodies(scene: tuple[SceneBody, ...]) -> tuple[SceneBody, ...]:
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise refuse(
-            "two bodies have this name", found=twice[0], allowed="each name once"
+            "two bodies have the same name", found=twice[0], allowed="each name once"
         )
     return named
 
 
 class SceneSource(Model):
-    """A scene whose bodies are in a file of their own."""
+    """A scene whose bodies are in a separate file."""
 
     file: Name
     """Scene file, relative to the task file."""
     frame: Name | None = None
-    """Name of the frame of all bodies that state neither frame nor link. Null: the world."""
+    """Frame of all bodies that state neither frame nor link. Null: the world."""
 
 
 class SceneFile(Model):
@@ -177,22 +177,22 @@ class SceneFile(Model):
     brachis_scene: Version
     """Version of the format."""
     bodies: tuple[SceneBody, ...]
-    """Bodies as in scene. File names are relative to this file, and frames are those of the task."""
+    """Bodies as in scene. File names are relative to this file. Frames are those of the task."""
 
 
 def with_scene_of_file(
     content: Mapping[str, Any], source: str, folder: Path
 ) -> Mapping[str, Any]:
-    """Return the content of a task with the bodies of the file that its ``scene`` names.
+    """Return the content of a task, with ``scene: {file: ...}`` replaced by the bodies in the file.
 
     Parameters
     ----------
     content : mapping
         A task, not checked yet.
     source : str
-        File name, or what else the task came from, for messages.
+        File name or other origin of the task, for messages.
     folder : Path
-        What the file's path is relative to.
+        Folder to which the path of the file is relative.
     """
     scene = content.get("scene")
     if not isinstance(scene, Mapping) or "file" not in scene:
@@ -211,7 +211,7 @@ def with_scene_of_file(
 
 
 def with_paths(bodies: tuple[SceneBody, ...], folder: Path) -> tuple[SceneBody, ...]:
-    """Return bodies with the paths of meshes and URDFs, relative to `folder`, made absolute."""
+    """Return bodies in which the paths of meshes and URDFs, relative to `folder`, are absolute."""
     return tuple(
         body.model_copy(
             update={

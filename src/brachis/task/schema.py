@@ -13,9 +13,9 @@ from brachis.task.models import Task
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a task file.
 
-    An editor with the YAML language server uses it to complete and check keys, if the file begins with
-    ``# yaml-language-server: $schema=task.schema.json``. Conditions on several keys (an angle only as the last row, no
-    blend on the last segment) are checked only by `brachis.task.load_task`.
+    An editor with the YAML language server uses the schema to complete and check keys, if the task file begins with
+    ``# yaml-language-server: $schema=task.schema.json``. Conditions that involve several keys, such as no blend on the
+    last segment, are checked only by `brachis.task.load_task`.
     """
     schema = Task.model_json_schema(mode="validation")
     known: list[type] = [LimitSpec, *_subclasses(Model)]
@@ -30,7 +30,7 @@ def json_schema() -> dict[str, Any]:
         **schema,
         "required": [
             key for key in schema["required"] if key != "start"
-        ],  # a path of joints may begin without it
+        ],  # a joint path may begin without it
         "title": "brachis task",
     }
 

@@ -1,13 +1,13 @@
 """Segments of the prescribed path, as the task file writes them.
 
-A path is a list of mappings, ``- line: {to: [0.5, 0]}``, each with an optional ``blend`` and, in task spaces of poses,
-an optional ``orientation``. A segment begins where its predecessor ends, and the first one at the task coordinates of
-the start posture. Lengths are in metres and angles in degrees. Yaw, pitch and roll as task coordinates are in radians.
-Points have the coordinates of all rows of the task space; for a pose these are x, y, z. Whether their number fits the
-task space is checked by `brachis.path.build_path`, which knows both.
+A path is a list of mappings such as ``- line: {to: [0.5, 0]}``, each with an optional ``blend`` and, in task spaces of
+poses, an optional ``orientation``. A segment begins where its predecessor ends; the first one begins at the task
+coordinates of the start posture. Lengths are in metres and angles in degrees, but yaw, pitch and roll as task
+coordinates are in radians. Points have the coordinates of all rows of the task space; for a pose these are x, y, z.
+`brachis.path.build_path` checks whether the number of coordinates fits the task space.
 
-A kind of segment consists of a model in this module, in the union `Segment`, and a function in `brachis.path` that
-makes its curve.
+A kind of segment consists of a model in this module, which belongs to the union `Segment`, and a function in
+`brachis.path` that makes its curve.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from brachis.task.point_data import FitReport, PointFile
 JointOrder = Annotated[
     tuple[Name, ...] | None,
     Field(
-        description="With task_space: joints, the joint of each coordinate. Null: chain order."
+        description="With task_space: joints, the joint that each coordinate belongs to. Null: chain order."
     ),
 ]
 SMOOTHNESS = 3
@@ -58,21 +58,21 @@ SMOOTHNESS = 3
 
 
 class BSplineCurve(CheckedModel):
-    """A clamped B-spline, three times continuously differentiable; `brachis.bspline_segment` turns a curve into one."""
+    """A clamped, three times continuously differentiable B-spline. `brachis.bspline_segment` makes one from a curve."""
 
     degree: Annotated[Count, Field(ge=SMOOTHNESS + 1, le=15)] = 5
     """Degree of the spline."""
     knots: Vector
-    """Ascending knots: the first and last degree + 1 times, inner ones up to degree - 3 times. Blends and speeds are in
-    m only if the knots are lengths along the curve in m."""
+    """Ascending knots: the first and the last are repeated degree + 1 times, inner ones up to degree - 3 times. Blends
+    and speeds are in m only if the knots are lengths along the curve in m."""
     control_points: Annotated[tuple[Vector, ...], Field(min_length=SMOOTHNESS + 2)]
-    """Points with all task coordinates (m, rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz, where the curve of the
-    quaternion is normalised."""
+    """Control points with all task coordinates (m, rad). For poses: x, y, z, or x, y, z, qw, qx, qy, qz; the curve of
+    the quaternion is normalised."""
     relative: Flag = False
-    """Whether the curve is moved to the segment's start."""
+    """Whether the curve is moved to the start of the segment."""
     joints: JointOrder = None
     speeds: tuple[tuple[tuple[Number, Positive], ...], ...] = ()
-    """Tables of the largest tool speed along sections of the curve: pairs [distance (m), speed (m/s)], interpolated
+    """Tables of the maximum tool speed along sections of the curve: pairs [distance (m), speed (m/s)], interpolated
     linearly."""
     fit: FitReport | None = None
     """Origin of the points; written by brachis."""
@@ -88,7 +88,7 @@ class BSplineCurve(CheckedModel):
         needed = len(self.control_points) + outer
         if len(knots) != needed:
             raise refuse(
-                "wrong number of knots",
+                "the number of knots is wrong",
                 key="knots",
                 found=len(knots),
                 allowed=f"{needed}: control points + degree + 1",
@@ -96,7 +96,7 @@ class BSplineCurve(CheckedModel):
         if len({len(point) for point in self.control_points}) > 1:
             yield (
                 "control_points",
-                "control points differ in their number of coordinates",
+                "control points have different numbers of coordinates",
                 "the same number for all",
             )
         ends = (knots[0], knots[-1])
@@ -124,17 +124,17 @@ class BSplineCurve(CheckedModel):
 Yaw = Annotated[
     Literal["fixed", "tangent"],
     Field(
-        description="Yaw, pitch or roll along the segment, if it is a row: fixed, or tangent (turns with the tangent)."
+        description="Course of the angle row (yaw, pitch or roll): fixed, or tangent (turns with the tangent)."
     ),
 ]
 Normal = Annotated[
     Direction | None,
     Field(
-        description="Axis of rotation, right-hand rule, of any length; with x, y and z."
+        description="Axis of rotation (right-hand rule), as a vector x, y, z of any length."
     ),
 ]
 Centre = Annotated[
-    Vector, Field(description="Centre, m: the position coordinates alone.")
+    Vector, Field(description="Centre, m: only the position coordinates.")
 ]
 
 
@@ -142,7 +142,7 @@ Coordinates = Annotated[
     Vector,
     BeforeValidator(lambda value: [value] if isinstance(value, int | float) else value),
 ]
-"""A single number stands for a list of one coordinate."""
+"""A single number is read as a list of one coordinate."""
 
 
 Turns = Annotated[
@@ -166,15 +166,15 @@ class LineBy(Model):
 
 
 class LineToPosture(Model):
-    """A straight line to where the tool is in a named posture; in task spaces of poses also to its orientation."""
+    """A straight line to the tool position, in task spaces of poses also to the orientation, of a named posture."""
 
     to_posture: Name
-    """Name of a posture. The line ends at its tool position, for poses also with its orientation."""
+    """Posture whose tool position (for poses also orientation) is the end of the line."""
     has_orientations: ClassVar[bool] = True
 
 
 class LineHeading(Model):
-    """A straight line of given length and direction in the plane of two position rows, along which the angle stays."""
+    """A straight line of given length and direction in the plane of two position rows; an angle row stays constant."""
 
     length: NonNegative
     """Length, m."""
@@ -187,7 +187,7 @@ class ArcCenter(Model):
 
     center: Centre
     angle_deg: Number
-    """Swept angle, degrees, positive about the normal or from the first towards the second position coordinate."""
+    """Swept angle, degrees. Positive: about the normal, or from the first towards the second position coordinate."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -196,9 +196,9 @@ class ArcVia(Model):
     """A circular arc through one point to another."""
 
     via: Vector
-    """Point on the arc, m: the position coordinates alone."""
+    """Point on the arc, m: only the position coordinates."""
     to: Vector
-    """End point, m: the position coordinates alone."""
+    """End point, m: only the position coordinates."""
     yaw: Yaw = "fixed"
 
 
@@ -207,7 +207,7 @@ class CircleTurns(Model):
 
     center: Centre
     turns: Turns = 1.0
-    """Number of turns, not zero, with the sign of an arc's angle."""
+    """Number of turns, not zero, with the sign convention of an arc's angle."""
     normal: Normal = None
     yaw: Yaw = "fixed"
 
@@ -219,33 +219,33 @@ class HelixTurns(Model):
     turns: Turns = 1.0
     """Number of turns, not zero, positive about the normal."""
     pitch: Number
-    """Rise per turn along the normal, m."""
+    """Distance along the normal per turn, m."""
     normal: Direction = (0.0, 0.0, 1.0)
-    """Axis of rotation, right-hand rule, of any length."""
+    """Axis of rotation (right-hand rule), of any length."""
 
 
 class SplineThrough(CheckedModel):
-    """A smooth curve from the start of the segment through waypoints, of which the first may equal the start."""
+    """A smooth curve from the start of the segment through waypoints. The first waypoint may equal the start."""
 
     through: NonEmpty[Coordinates]
     """Waypoints, each with all task coordinates (m, angles in rad)."""
     orientations: tuple[Attitude, ...] | None = None
-    """Orientation of the tool at each waypoint, for poses. Null: as the segment's orientation says."""
+    """For poses, orientation of the tool at each waypoint. Null: as in the segment's orientation."""
     relative: Flag = False
-    """Whether waypoints are relative to the start of the segment, displacements in the path's frame and rotations in
-    the tool frame."""
+    """Whether waypoints are relative to the start of the segment. If so, displacements are in the frame of the path and
+    rotations in the tool frame."""
     starts_at: Vector | None = None
-    """Expected start of the segment, all task coordinates, to within 1e-4 m or rad. With relative, waypoints are
+    """Expected start of the segment to within 1e-4 m or rad, all task coordinates. With relative, waypoints are
     relative to this point."""
     starts_oriented: Attitude | None = None
-    """Expected orientation at the start; only with orientations."""
+    """Expected orientation at the start; requires orientations."""
     fit: FitReport | None = None
     """Origin of the points; written by brachis."""
     joints: JointOrder = None
 
     @property
     def has_orientations(self) -> bool:
-        """Whether the waypoints have orientations of the tool."""
+        """Whether the waypoints include orientations of the tool."""
         return self.orientations is not None
 
     @model_validator(mode="before")
@@ -268,18 +268,18 @@ class SplineThrough(CheckedModel):
                 "the numbers of waypoints and of orientations differ",
                 key="orientations",
                 found=len(self.orientations),
-                allowed=f"{count}, as there are waypoints in through",
+                allowed=f"{count}, one for each waypoint in through",
             )
         if self.orientations is None and self.starts_oriented is not None:
             yield (
                 "starts_oriented",
-                "an orientation at the start needs orientations at the waypoints",
+                "an orientation at the start requires orientations at the waypoints",
                 "orientations as well",
             )
 
 
 def are_matrices(values: Any) -> bool:
-    """Return whether values are transforms, rotations or their matrices, not coordinates or content of a task file."""
+    """Return whether values are transforms, rotations or their matrices, rather than content of a task file."""
     first = values[0] if isinstance(values, list) and values else values
     return any(hasattr(first, name) for name in ("homogeneous", "as_matrix")) or (
         isinstance(first, list) and isinstance(first[0] if first else None, list)
@@ -295,12 +295,13 @@ _Start = tuple[tuple[float, ...], Attitude | None]
 
 
 class SegmentModel(CheckedModel):
-    """The keys that all segments share."""
+    """Keys that are common to all segments."""
 
     blend: Positive | None = None
-    """Rounding of the corner at the END of the segment: length cut from this segment and from the next one, m."""
+    """Rounding of the corner at the END of the segment: length cut from this segment and from the next, m."""
     stop: Flag = False
-    """Whether the tool stops at the end of this segment: all joints are at rest there, and the path may have a corner.
+    """Whether the tool stops at the end of this segment. All joints are then at rest there, and the path may have a
+    corner.
     """
     dwell: NonNegative = 0.0
     """Time at rest at the end of the segment, s."""
@@ -316,7 +317,7 @@ class SegmentModel(CheckedModel):
         if 0.0 < self.dwell < 1e-3:
             yield (
                 "dwell",
-                "the dwell is shorter than a cycle of a robot's controller",
+                "the dwell is shorter than a cycle of a robot controller",
                 "0, or at least 0.001 s",
             )
         if self.dwell and not self.stop:
@@ -324,7 +325,7 @@ class SegmentModel(CheckedModel):
         if self.stop and self.blend is not None:
             yield (
                 "blend",
-                "the tool stops at the end of this segment, so its corner is not rounded",
+                "the tool stops at the end of this segment, so the corner there is not rounded",
                 "either blend, or stop (or dwell)",
             )
 
@@ -341,36 +342,36 @@ class SegmentModel(CheckedModel):
         return (*path, self) if isinstance(path, tuple) else NotImplemented
 
     def __repr__(self) -> str:
-        """Return the call by which a program makes the segment."""
+        """Return the call that creates the segment in a program."""
         arguments = show_arguments(self.shape) + show_arguments(self, self.kind)
         name = type(self).__name__.removesuffix("Segment")
         return f"{name}({', '.join(arguments)})"
 
     @property
     def start(self) -> _Start | None:
-        """Coordinates and tool orientation at which the segment states that it starts; None if it states none."""
+        """Start that the segment states, as coordinates and tool orientation; None if it states none."""
         return None
 
     @property
     def kind(self) -> str:
-        """The key that names the segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
+        """The key for this kind of segment in the task file: ``line``, ``arc``, ``circle``, ``spline``, ..."""
         return required_keys(type(self))[0]
 
     @property
     def shape(self) -> Any:
-        """The value of the key that names the segment: a `LineTo`, an `ArcCenter`, ..."""
+        """The value of this key: a `LineTo`, an `ArcCenter`, ..."""
         return getattr(self, self.kind)
 
 
 class MovingSegment(SegmentModel):
-    """The keys shared by all segments along which the position moves."""
+    """The keys shared by all segments along which the position changes."""
 
     orientation: OrientationMode = None
-    """Turning of the tool along the segment, for poses: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
-    Null: as a spline's orientations or the posture say, otherwise fixed."""
+    """For poses, turning of the tool along the segment: fixed, tangent, {rotate: ...}, {to: ...} or {tangent: ...}.
+    Null: to the orientations of a spline or of the posture, otherwise fixed."""
     speed: Positive | None = None
     """Process speed: constant speed of the tool along the segment except its blends, m/s, as in
-    tool_limits.process_speed. It replaces feed rates of points. For this speed on the whole segment, put a short line
+    tool_limits.process_speed. It replaces feed rates of points. To hold the speed on the whole segment, put short lines
     without it before and after: a run-in and a run-out."""
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -380,7 +381,7 @@ class MovingSegment(SegmentModel):
             yield (
                 "orientation",
                 f"the {self.kind} already has orientations",
-                f"orientation, or the orientations of the {self.kind} itself, not both",
+                f"either orientation, or the orientations of the {self.kind} itself",
             )
 
 
@@ -441,7 +442,7 @@ class SplineSegment(MovingSegment):
 
 
 class TurnSegment(SegmentModel):
-    """A turn of the tool on the spot, in task spaces of poses."""
+    """A turn of the tool on the spot; only in task spaces of poses."""
 
     turn: Turning
 
@@ -466,7 +467,7 @@ class BSplineSegment(MovingSegment):
 
 
 class CsvSegment(MovingSegment):
-    """A smooth curve along points from a file."""
+    """A smooth curve along the points in a file."""
 
     csv: PointFile
 

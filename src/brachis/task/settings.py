@@ -1,4 +1,4 @@
-"""The settings of a task: the robot with its friction, payload and mounting, and the settings of the planner."""
+"""The settings of a task: the robot with its friction, payload and mounting, and the planner."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 
 
 class Placement(Model):
-    """The placement of a frame in another one."""
+    """The placement of a frame relative to another frame."""
 
     xyz: Vector3 = (0.0, 0.0, 0.0)
     """Position of the origin, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw about the fixed x, then y, then z axis, degrees, as in a URDF."""
+    """Roll, pitch and yaw about the fixed x, y and z axes, degrees, as in a URDF."""
 
     @model_validator(mode="before")
     @classmethod
@@ -62,14 +62,14 @@ class Placement(Model):
 
 
 class FramePlacement(Placement):
-    """The placement of a frame in the world or in another frame."""
+    """The placement of a named frame in the world or in another frame."""
 
     frame: Name | None = None
-    """Name of the frame in which it is placed. Null: the world."""
+    """Frame in which it is placed. Null: the world."""
 
 
 def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Placement:
-    """Return the placement of a frame in the world, through all frames in which it is placed; None is the world."""
+    """Return the placement of a frame in the world, through all frames in which it is placed. None is the world."""
     if name is None:
         return Placement()
     placed = frames[name]
@@ -85,7 +85,7 @@ def place_frame(frames: Mapping[str, FramePlacement], name: str | None) -> Place
 def check_frames(
     frames: Mapping[str, FramePlacement], uses: Mapping[str, str | None]
 ) -> None:
-    """Refuse frames that are placed in themselves, and names of undefined frames; `uses` has the names by their keys.
+    """Refuse frames that are placed in themselves, and names of undefined frames; `uses` contains the names by key.
 
     Raises
     ------
@@ -102,12 +102,12 @@ def check_frames(
             "the frame is placed in itself",
             key=f"frames.{cycle[0]}.frame",
             found=" in ".join(cycle[:4]),
-            allowed="frames that lead to the world",
+            allowed="a chain of frames that ends in the world",
         ) from None
 
 
 class InertiaMatrix(Model):
-    """Moments and products of inertia about the centre of mass, in the axes of the tool frame."""
+    """Moments and products of inertia about the centre of mass, along the axes of the tool frame."""
 
     ixx: NonNegative
     """Moment of inertia, kg m^2."""
@@ -131,7 +131,7 @@ class Payload(Model):
     com: Vector3 = (0.0, 0.0, 0.0)
     """Centre of mass in the tool frame of the URDF, m."""
     inertia: InertiaMatrix | None = None
-    """Inertia about the centre of mass, in the axes of the tool frame. Null: a point mass."""
+    """Inertia about the centre of mass, along the axes of the tool frame. Null: a point mass."""
 
 
 _WORDS: Final = {
@@ -139,16 +139,16 @@ _WORDS: Final = {
     "wall": (0.0, 90.0, 0.0),
     "ceiling": (180.0, 0.0, 0.0),
 }
-"""Roll, pitch and yaw of the named mountings, degrees."""
+"""Roll, pitch and yaw of each named mounting, degrees."""
 
 
 def _expand_word(mounting: object) -> object:
-    """Return the placement for a word such as ``wall``."""
+    """Return the placement that a word such as ``wall`` stands for."""
     if not isinstance(mounting, str):
         return mounting
     if mounting not in _WORDS:
         raise refuse(
-            "this is not a mounting",
+            "this mounting is unknown",
             found=mounting,
             allowed=f"{', '.join(_WORDS)}, or a mapping {{xyz: [x, y, z], rpy_deg: [roll, pitch, yaw]}}",
         )
@@ -190,31 +190,32 @@ UrdfFriction = Annotated[
 
 
 class FrictionSettings(Model):
-    """Drive inertia and friction at the joints: numbers for all joints, lists, or mappings by joint name."""
+    """Drive inertia and friction at the joints: each a number for all joints, a list, or a mapping by joint name."""
 
     armature: UrdfFriction = FROM_URDF
-    """Inertia of the drive as seen at the joint, kg m^2 (kg). Absent: the value of an MJCF file or Pinocchio model."""
+    """Inertia of the drive reflected to the joint, kg m^2 (kg). Absent: the value of an MJCF file or Pinocchio
+    model."""
     rotor_inertia: PerJoint = 0.0
     """Inertia of the rotor about its axis, kg m^2; armature is then rotor_inertia * gear_ratio^2."""
     gear_ratio: PerJointPositive | None = None
-    """Turns of the rotor per turn of the joint (prismatic: rad per m)."""
+    """Turns of the rotor per turn of the joint (for a prismatic joint, rad per m)."""
     viscous: UrdfFriction = FROM_URDF
-    """Viscous friction, N m s/rad (N s/m). Absent: the damping of the URDF."""
+    """Viscous friction, N m s/rad (N s/m). Absent: the damping in the URDF."""
     coulomb: UrdfFriction = FROM_URDF
-    """Coulomb friction, N m (N). Absent: the friction of the URDF."""
+    """Coulomb friction, N m (N). Absent: the friction in the URDF."""
     coulomb_velocity: PerJointPositive = 0.01
     """Speed at which Coulomb friction reaches 76 % (tanh 1) of its full value, rad/s (m/s)."""
 
 
 class RobotSettings(Model):
-    """The robot: its URDF, and the settings that the task adds."""
+    """The robot: its URDF, and settings that the URDF does not contain."""
 
     urdf: Name | None = None
     """URDF or MJCF file, or name of an included robot. Required in a task file."""
     tool_frame: Name | None = None
     """Frame that follows the path. Null: the only leaf link."""
     tool_offset: Placement = Field(default_factory=Placement)
-    """Placement, in the URDF's tool frame, of the frame that follows the path: {xyz: ..., rpy_deg: ...}."""
+    """Placement of the frame that follows the path, relative to tool_frame: {xyz: ..., rpy_deg: ...}."""
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
     mounting: Mounting = Field(default_factory=Placement)
@@ -223,7 +224,7 @@ class RobotSettings(Model):
     gravity: tuple[Number, Number, Number] = (0.0, 0.0, -9.81)
     """Gravity [x, y, z] in the world frame, m/s^2."""
     locked_joints: dict[Name, Number] = Field(default={})
-    """Positions of joints that do not move, by name, rad (m). Joints that mimic them take the matching positions."""
+    """Positions of joints that do not move, by name, rad (m). Joints that mimic them get the matching positions."""
     payload: Payload | None = None
     """Rigid body fixed to the tool frame: {mass: ..., com: ..., inertia: ...}."""
     limits_file: Name | None = None
@@ -231,8 +232,8 @@ class RobotSettings(Model):
     limits: LimitSpec = Field(default_factory=LimitSpec)
     """Joint limits."""
     speed_override: Share = Field(default=1.0, gt=0.0, le=1.0)
-    """Factor on all velocity limits, besides limits.scale: 50 % or 0.5. The motion is planned for these lower limits,
-    not played more slowly."""
+    """Factor on all velocity limits, in addition to limits.scale; for example 50 % or 0.5. The motion is planned for
+    these lower limits, not played more slowly."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
 
@@ -245,30 +246,31 @@ Intervals = Annotated[
 
 
 class SplineSettings(CheckedModel):
-    """The B-splines of the path coordinate and the redundant joints."""
+    """Settings of the B-splines of the path coordinate and the redundant joints."""
 
     degree: Count = Field(default=3, ge=2, le=7)
     """Degree of the splines: 3 for a continuous torque, 4 for a continuous torque rate."""
     intervals: Intervals = "auto"
-    """Number of knot intervals of every phase. auto: the fastest timing of the best joint path, with knots where it
-    needs them; with limits on jerk, torque rate or means it halves the intervals that cost most time until two rounds
-    gain less than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower.
+    """Number of knot intervals of every phase. auto: fastest timing of the best joint path, with knots where needed;
+    with limits on jerk, torque rate or mean values, the intervals that cost most time are halved until two rounds gain
+    less than half the tolerance. A number (required by knots: free) makes planning faster and the motion slower.
     """
     tolerance: Share = Field(default=1.0e-3, gt=0.0, le=0.1)
-    """With intervals: auto, accepted loss of end time compared with very many intervals: 0.1 % or 0.001."""
+    """With intervals: auto, accepted increase of the end time over that with very many intervals, such as 0.1 % or
+    0.001."""
     knots: Literal["uniform", "free"] = "uniform"
     """uniform: intervals of equal length. free: their lengths are optimised."""
     shortest_interval: Share = Field(default=0.1, gt=0.0, lt=1.0)
-    """With knots: free, the shortest interval relative to the mean; never below 5e-5 of the end time."""
+    """With knots: free, shortest interval relative to the mean interval; never below 5e-5 of the end time."""
     rest: Literal["velocity", "full", "jerk"] = "full"
     """Derivatives that are zero at both ends and at stops. velocity: the velocity. full: also the acceleration. jerk:
-    also jerk and torque rate; needs degree >= 4."""
+    also the jerk and the torque rate; needs degree >= 4."""
     points_per_interval: Count = Field(default=3, ge=1, le=100)
-    """Number of collocation points per knot interval."""
+    """Number of collocation points in each knot interval."""
 
     @property
     def vanishing(self) -> int:
-        """Number of derivatives of the joint positions that vanish at both ends and at stops."""
+        """Number of derivatives of the joint positions that are zero at both ends and at stops."""
         return _VANISHING[self.rest]
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -277,13 +279,13 @@ class SplineSettings(CheckedModel):
             lower = [word for word, level in _VANISHING.items() if level < self.degree]
             yield (
                 "degree",
-                f"rest: {self.rest} needs {order} continuous derivatives, zero at the ends: the degree is too low",
+                f"rest: {self.rest} needs {order} continuous derivatives, zero at the ends; the degree is too low",
                 f">= {order + 1}, or rest: {' or '.join(lower)}",
             )
         if self.knots == "free" and self.intervals == "auto":
             yield (
                 "intervals",
-                "knots: free needs a number of intervals, and the default is auto",
+                "knots: free needs a number of intervals, but the default is auto",
                 "a number such as 12, or knots: uniform",
             )
 
@@ -295,26 +297,27 @@ Jobs = Annotated[
 
 
 class SearchSettings(CheckedModel):
-    """The search over redundant joints, branches and initial guesses."""
+    """Settings of the search over redundant joints, branches and initial guesses."""
 
     effort: Literal["single", "fast", "thorough", "exhaustive"] = "fast"
-    """Extent of the search, with ever more guesses: single (one plan from the best guess; like fast if that fails),
+    """Extent of the search, from few to many guesses: single (one plan from the best guess; like fast if it fails),
     fast, thorough, exhaustive."""
     guesses: Literal["lattice", "numeric"] = "lattice"
     """Source of the initial guesses: lattice (of postures) or numeric (inverse kinematics from the start posture)."""
     jobs: Jobs = 1
-    """Number of processes that plan at the same time, at most that of processors. auto: all processors if the remaining
-    work takes more than 3 s, or 0.7 s if they run already. The result does not depend on it, unless the time runs out.
+    """Number of parallel processes, at most the number of processors. auto: all processors if the remaining work takes
+    more than 3 s, or 0.7 s if the processes already run. The result does not depend on the number, unless the time runs
+    out.
     """
     time_limit: Positive = Field(default=60.0, le=1e6)
-    """Time limit of the whole plan, s. The best verified motion is returned, or an unverified one up to 2 s later."""
+    """Time limit of the plan, s. Then the best verified motion is returned, or up to 2 s later an unverified one."""
     seed: Count = Field(default=0, ge=0)
-    """Seed of the random numbers."""
+    """Seed of the random number generator."""
     least_motion: Flag = True
     """Whether to choose the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time. With more
-    than 200 variables, as intervals: auto often has, this needs slower."""
+    than 200 variables, which are common with intervals: auto, slower is required."""
     slower: Share = Field(default=0.0, ge=0.0, le=1.0)
-    """Fraction by which the smoothest motion may be slower: 1 % or 0.01."""
+    """Fraction by which the smoothest motion may be slower, for example 1 % or 0.01."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         if self.slower and not self.least_motion:
@@ -326,7 +329,7 @@ class SearchSettings(CheckedModel):
 
 
 class SolverSettings(Model):
-    """The solver of the optimisation problem and its settings."""
+    """Settings of the solver of the optimisation problem."""
 
     name: Name = "auto"
     """auto (starts with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
@@ -339,31 +342,31 @@ class SolverSettings(Model):
 
 
 class RefinementSettings(Model):
-    """Adding collocation points until the limits are also met between them."""
+    """Settings for adding collocation points until limits are also met between them."""
 
     tolerance: Share = Field(default=1.0e-4, ge=1.0e-5, le=0.01)
-    """Largest accepted violation of a limit at any time, relative to the limit. For a position it is in rad (m), or
-    relative to half its range if that is below 1 rad (m). The checks do not resolve less than 1e-5."""
+    """Maximum accepted violation of a limit at any time, relative to the limit. For a position: in rad (m), or relative
+    to half the range if this is below 1 rad (m). The checks do not resolve less than 1e-5."""
     density: Count = Field(default=10, ge=10, le=1000)
-    """Number of points, per collocation point, at which limits are checked."""
+    """Number of points per collocation point at which limits are checked."""
     max_rounds: Count = Field(default=10, ge=0, le=1000)
     """Maximum number of rounds. 0: no refinement."""
 
 
 def expand_solver_name(solver: object) -> object:
-    """Return the mapping for a solver that is given by its name alone, ``solver: ipopt``."""
+    """Return the mapping for a solver that is given only by name, as in ``solver: ipopt``."""
     return {"name": solver} if isinstance(solver, str) else solver
 
 
 class BoundarySettings(CheckedModel):
-    """Speeds at both ends of the path, or a motion that repeats without end."""
+    """Speeds at both ends of the path, or an endlessly repeated motion."""
 
     start_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its start, m/s (rad/s if the tool only turns there; for a path of joints the norm of
-    their velocities). If it is not zero, velocities of redundant joints are free there, and with spline.rest: full the
-    speed does not change at that instant."""
+    """Speed along the path at its start, m/s (rad/s if the tool only turns there; for a joint path the norm of the
+    joint velocities). If it is not zero, the velocities of redundant joints are free there; with spline.rest: full the
+    speed is constant at that instant."""
     end_speed: NonNegative = Field(default=0.0, le=1e6)
-    """The same at the end."""
+    """Speed along the path at its end, in the same unit."""
     periodic: Flag = False
     """Whether a closed path is repeated without stopping. It then ends with the posture (except for whole turns of
     joints without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps
@@ -374,11 +377,11 @@ class BoundarySettings(CheckedModel):
             if self.periodic and getattr(self, key):
                 yield (
                     key,
-                    "a periodic motion has no ends, so its speed there cannot be set",
+                    "a periodic motion has no ends, so a speed at its ends cannot be set",
                     "0, or periodic: false",
                 )
 
     @property
     def in_motion(self) -> bool:
-        """Whether the robot moves at an end of the path."""
+        """Whether the robot is in motion at an end of the path."""
         return self.periodic or self.start_speed > 0.0 or self.end_speed > 0.0

@@ -1,4 +1,4 @@
-"""The rows that a path prescribes, the tolerances within which the tool may leave it, and the margins of the arm."""
+"""Rows that a path prescribes, tolerances within which the tool may leave the path, and margins of the arm."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ EACH_ONCE = must(
 )
 _ANGLE_LAST = must(
     lambda rows: {*rows[:-1]} <= {*POSITION},
-    "only one row of rotation is possible, and it comes last",
+    "only one row of rotation is possible, and it must be the last",
     "for example [x, y, z, yaw] or [x, y, axis]",
 )
 
 
 def _name_space(space: str | tuple[str, ...]) -> str | tuple[str, ...]:
-    """Return the one name of a task space, so that equal task spaces compare equal."""
+    """Return the standard name of a task space, so that equal task spaces compare equal."""
     if space == (*POSITION, "axis"):
         return "pose_free_roll"
     return {"position": POSITION, "axis": ("axis",)}.get(str(space), space)
@@ -56,20 +56,20 @@ TaskSpace = Annotated[
 _Given = float | tuple[float, float] | Literal["free"] | None
 _FORMS = "a number > 0, or [low, high] with low < high"
 _FARTHEST = 10.0
-"""Largest tolerance of the position, m."""
+"""Maximum tolerance of the position, m."""
 
 
 def _range_within(largest: float) -> AfterValidator:
-    """Return a validator that reads a number a as [-a, a], and refuses empty ranges and ends farther from zero."""
+    """Return a validator that reads a number a as [-a, a], and refuses empty ranges and ends too far from zero."""
 
     def read(value: _Given) -> _Given:
-        """Return one range as a pair."""
+        """Return a range as a pair [low, high]."""
         if value is None or value == "free":
             return value
         low, high = value if isinstance(value, tuple) else (-value, value)
         if not -largest <= low < high <= largest:
             raise refuse(
-                "this is not a range",
+                "this is not a valid range",
                 found=value,
                 allowed=f"{_FORMS}, all within {largest:g} of zero",
             )
@@ -91,7 +91,7 @@ _Distance = Annotated[_Ends, _range_within(_FARTHEST)]
 def _ranges_outside(
     model: Model, largest: str, ranges: Iterable[str]
 ) -> Iterator[Mistake]:
-    """Yield the ranges that lie outside the cone or sphere of the same model."""
+    """Yield the ranges that lie entirely outside the cone or sphere of the same model."""
     reach = getattr(model, largest)
     for key in ranges:
         ends = getattr(model, key)
@@ -104,13 +104,13 @@ def _ranges_outside(
 
 
 class OrientationTolerance(CheckedModel):
-    """Ranges in which the tool may turn away from the orientation of the path, about the axes of the tool frame."""
+    """Ranges within which the tool may turn, about the axes of its frame, away from the path's orientation."""
 
     tilt: Annotated[Positive, Field(le=80.0)] | None = None
-    """Largest angle between the tool's z axis and that of the path, degrees: a cone. Null: only lead and side count."""
+    """Maximum angle between the tool's z axis and that of the path, degrees: a cone. Null: only lead and side apply."""
     lead: _Lean = None
     """Angle by which the z axis leans towards the x axis of the path's orientation, degrees: a number for both sides,
-    or [low, high]. If x points along the path and z out of the torch, positive angles are lead and negative ones lag.
+    or [low, high]. If x points along the path and z out of the torch, positive angles are lead and negative angles lag.
     """
     side: _Lean = None
     """Angle by which the z axis leans towards the y axis of the path's orientation, degrees."""
@@ -122,19 +122,19 @@ class OrientationTolerance(CheckedModel):
 
 
 class PositionTolerance(CheckedModel):
-    """Ranges in which the tool may leave the position of the path."""
+    """Ranges within which the tool may leave the position of the path."""
 
     sphere: Annotated[Positive, Field(le=_FARTHEST)] | None = None
-    """Largest distance, m."""
+    """Maximum distance from the position of the path, m."""
     x: _Distance = None
-    """Displacement along x, m: a number for both sides, or [low, high]. With task_space: position the path has no
-    orientation, and the axes are those of the tool itself."""
+    """Displacement along x, m: a number for both sides, or [low, high]. With task_space: position, the path has no
+    orientation; the axes are then those of the tool itself."""
     y: _Distance = None
     """Displacement along y, m."""
     z: _Distance = None
     """Displacement along z, m."""
     axes: Literal["tool", "world"] = "tool"
-    """Frame of x, y and z: the orientation of the path (tool) or the world."""
+    """Axes of x, y and z: those of the path's orientation (tool) or of the world."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         axes = [axis for axis in POSITION if getattr(self, axis) is not None]
@@ -148,19 +148,19 @@ class PositionTolerance(CheckedModel):
 
 
 class Tolerances(Model):
-    """Ranges within which the tool may leave the path."""
+    """Tolerances within which the tool may leave the path."""
 
     orientation: OrientationTolerance = Field(default_factory=OrientationTolerance)
-    """Ranges of the orientation: {tilt: 15}, in degrees."""
+    """Tolerances of the orientation: {tilt: 15}, in degrees."""
     position: PositionTolerance = Field(default_factory=PositionTolerance)
-    """Ranges of the position: {sphere: 0.002}, in m."""
+    """Tolerances of the position: {sphere: 0.002}, in m."""
 
 
 class Margins(Model):
-    """Margins that the motion keeps. The smallest ones of a motion are reported in any case."""
+    """Margins that the motion must keep. The smallest margins of a motion are reported even if none are set."""
 
     singularity: Positive | None = None
-    """Least allowed singular value of the Jacobian of the task space's rows with respect to the arm's own joints (m and
-    rad per rad and m), without tolerances and free roll. Null: none."""
+    """Minimum allowed singular value of the Jacobian of the rows of the task space with respect to the arm's own joints
+    (m and rad per rad and m), without tolerances and free roll. Null: none."""
     joint_ends: Annotated[Positive, Field(lt=0.5)] | None = None
-    """Fraction of each joint's range to keep free at either end, such as 0.05. Null: none."""
+    """Fraction of each joint's range to keep free at each end, such as 0.05. Null: none."""

@@ -37,11 +37,11 @@ _UNITS = {
     }.items()
     for name in names.split()
 } | {f"limits.{name}": row.unit for name, row in ROBOT_LIMITS.items()}
-"""Units by the last two names of a key; the unit of prismatic joints is in brackets."""
+"""Units by the last two names of a key. The unit for prismatic joints is in brackets."""
 
 
 def unit_of(key: str) -> str:
-    """Return the unit of a dotted key of a task, or of a joint's or row's entry in it; empty if it has none.
+    """Return the unit of a dotted key of a task, or of one entry of its value; empty if there is no unit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Strict reading of YAML: no duplicate keys, numbers as in YAML 1.2, bounded size, errors with line and column."""
+"""Strict reading of YAML: no duplicate keys, numbers as in YAML 1.2, limited size, errors with line and column."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 _LARGEST = 1_000_000
-"""Largest number of nodes of a document with all its aliases expanded."""
+"""Maximum number of nodes of a document after its aliases are expanded."""
 _UNITS = {
     "!radians": 1.0,
     "!degrees": math.pi / 180.0,
@@ -26,7 +26,7 @@ _UNITS = {
     "!foot": 0.3048,
     "!inches": 0.0254,
 }
-"""Tags of units, the same as in xacro, with their factors to SI units."""
+"""Tags of units, the same as in xacro, with their conversion factors to SI units."""
 _BROKEN = (
     yaml.YAMLError,
     ValueError,
@@ -40,15 +40,15 @@ _BROKEN = (
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that builds only plain data, and refuses duplicate keys."""
+    """A YAML loader that builds only plain data and refuses duplicate keys."""
 
     def construct_mapping(
         self,
         node: yaml.MappingNode,
         deep: bool = False,  # noqa: FBT002
     ) -> dict[Hashable, Any]:
-        """Build the mapping of a node, as PyYAML does, unless a key occurs twice (MarkedYAMLError)."""
-        # This comes before merge keys (<<) are expanded, because the keys that they add may be overridden.
+        """Build the mapping of a node as PyYAML does; if a key occurs twice, raise MarkedYAMLError."""
+        # The check precedes the expansion of merge keys (<<), because the keys that these add may be overridden.
         keys: set[str] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
@@ -61,7 +61,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)
 
     def get_single_node(self) -> yaml.Node | None:
-        """Parse the document, unless its aliases make it infinite or far too long (MarkedYAMLError)."""
+        """Parse the document; if its aliases make it infinite or far too long, raise MarkedYAMLError."""
         node = super().get_single_node()
         if node is not None and (size := _size(node, {})) > _LARGEST:
             problem = f"{size:.3g} values with all aliases expanded, more than the {_LARGEST} allowed"
@@ -76,7 +76,7 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
     if isinstance(node, yaml.ScalarNode):
         return 1.0
     if id(node) not in known:
-        known[id(node)] = math.inf  # while inside
+        known[id(node)] = math.inf  # while its children are counted
         children = (
             node.value
             if isinstance(node, yaml.SequenceNode)
@@ -87,9 +87,9 @@ def _size(node: yaml.Node, known: dict[int, float]) -> float:
 
 
 def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
-    """Return a number with a unit, such as ``!degrees 90``, in SI units (MarkedYAMLError).
+    """Return a number with a unit, such as ``!degrees 90``, in SI units; raise MarkedYAMLError for anything else.
 
-    A list is refused: `!degrees` before the positions of all joints would also change those in m.
+    A list is refused, because `!degrees` before the positions of all joints would also convert those in m.
     """
     value = math.nan
     if isinstance(node, yaml.ScalarNode) and node.style is None:
@@ -104,15 +104,15 @@ def _with_unit(_loader: _Loader, node: yaml.Node) -> float:
 
 
 def _describe(node: yaml.Node) -> str:
-    """Describe the node that stands in place of a number with a unit, for messages."""
+    """Describe, for a message, a node that is in the place of a number with a unit."""
     if isinstance(node, yaml.ScalarNode):
         return reprlib.repr(node.value)
     kind = "mapping" if isinstance(node, yaml.MappingNode) else "list"
-    return f"a {kind}: put it before each number that has this unit"
+    return f"a {kind}: put the tag before each number that has this unit"
 
 
 def _refuse_tag(_loader: _Loader, node: yaml.Node) -> NoReturn:
-    """Refuse a tag that is neither one of YAML nor a unit (MarkedYAMLError)."""
+    """Refuse a tag that is neither a unit nor a standard YAML tag, by MarkedYAMLError."""
     raise yaml.MarkedYAMLError(
         problem=str(UnknownNameError("tag", node.tag, _UNITS)),
         problem_mark=node.start_mark,
@@ -123,7 +123,7 @@ for _tag in _UNITS:
     _Loader.add_constructor(_tag, _with_unit)
 _Loader.add_constructor(None, _refuse_tag)
 
-# PyYAML reads YAML 1.1, in which 1e-6 (no point, or no sign of the exponent) is a string. Everybody means the number.
+# PyYAML reads YAML 1.1, in which 1e-6 (no point, or no sign of the exponent) is a string. Users always mean the number.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
@@ -137,7 +137,7 @@ def read_yaml(text: str, source: str) -> object:
     Raises
     ------
     TaskError
-        The text is not YAML, or repeats a key; the message has line and column.
+        The text is not YAML, or repeats a key; the message states line and column.
     """
     try:
         return _Loader(text).get_single_data()

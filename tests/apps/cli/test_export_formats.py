@@ -34,7 +34,7 @@ def test_some_joints(run, error_of, result, tmp_path):
     remark, header = file.read_text().splitlines()[:2]
     assert header.startswith("t,q_j3,q_j1,qd_j3")
     assert remark.startswith("# brachis: joint j2 moves by ")
-    assert "servoj takes the angles of six joints" in error_of(
+    assert "servoj needs the angles of six joints" in error_of(
         f"export {result} --out {tmp_path / 'motion.script'}"
     )
 

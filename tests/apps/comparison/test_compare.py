@@ -96,7 +96,7 @@ def test_the_limits_are_the_same_and_remarks_name_what_exceeds_them(
     )  # what the rows prove
     assert all(use.recorded <= use.recorded_up_to for use in both_motions.uses)
     *exceeded, jumps = both_motions.remarks  # as toppra's accelerations do at both ends
-    assert "the plan may do so as well" in jumps
+    assert "the plan may do so too" in jumps
     assert bool(both_motions.exceeded) == (worst > 1.0 + 1e-4) == bool(exceeded)
     assert all("the recorded motion exceeds the" in remark for remark in exceeded)
     data = json.loads(json.dumps(both_motions.to_dict()))

@@ -94,6 +94,6 @@ def test_a_run_of_another_plan_is_refused(planned, tmp_path):
         error=lambda times: np.outer(0 * times + 2.0, np.eye(7)[1]),
     )
     with pytest.raises(
-        InputError, match="not a run of the plan; found joint_1 is 2 rad"
+        InputError, match="not a run of the plan; found joint_1 deviates by 2 rad"
     ):
         brachis.compare_run(path, planned, "kuka_rsi_4ms")

@@ -152,7 +152,10 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
         ({"moves": "linear"}, "samples have no moves"),
         ({"form": "json"}, "no such format; found json; allowed: csv, program"),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
-        ({"form": "program", "time_tolerance": 1e-15}, "no program of positions keeps"),
+        (
+            {"form": "program", "time_tolerance": 1e-15},
+            "no program of positions is within",
+        ),
     ],
 )
 def test_options_that_a_controller_cannot_take_are_refused(
@@ -185,7 +188,7 @@ def test_degrees_and_mm_are_named_in_the_header(turn, tmp_path):
 
 
 def test_ros_2_refuses_degrees(turn, tmp_path):
-    with pytest.raises(InputError, match="takes rad and m; found m, deg"):
+    with pytest.raises(InputError, match="needs rad and m; found m, deg"):
         brachis.export.write(turn, tmp_path / "run.yaml", degrees=True)
     assert not (tmp_path / "run.yaml").exists()
 

@@ -343,5 +343,7 @@ def test_heads_name_the_robot_the_positions_and_the_deviation(seam, tmp_path):
 
 
 def test_a_language_without_external_axes_refuses_a_rail(seam, tmp_path):
-    with pytest.raises(brachis.InputError, match=r"no external axes; found j1, .*, e1"):
+    with pytest.raises(
+        brachis.InputError, match=r"not support external axes; found j1, .*, e1"
+    ):
         write(seam, "staubli_val3", tmp_path)

@@ -141,7 +141,7 @@ def ur10(line_trajectory):
 
 def test_urscript(ur10, tmp_path):
     path, joints = tmp_path / "motion.script", ur10.joint_names[1:]
-    told = r"six joints; found rail \(m\), .*List only the arm's six"
+    told = r"six joints; found rail \(m\), .*List only the six joints of the arm"
     with pytest.raises(InputError, match=told):
         export.write(ur10, path)
     with pytest.warns(BrachisWarning, match="rail"):

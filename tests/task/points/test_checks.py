@@ -78,7 +78,7 @@ def test_notes_list_rows_that_repeat():
     kept = without_repetitions(points(position))
     np.testing.assert_array_equal(kept.position, wave(10))
     assert kept.notes == (
-        "left out 3 rows at the position of the row before: rows 2, 7, 8",
+        "left out 3 rows at the position of the previous row: rows 2, 7, 8",
     )
     assert without_repetitions(points(wave(10))).notes == ()
 
@@ -87,7 +87,7 @@ def test_a_turn_on_the_spot_is_an_error():
     position, yaw = np.repeat(wave(4)[:, :2], 2, axis=0), np.arange(8.0)[:, None] / 10.0
     with pytest.raises(
         TaskError,
-        match=r"row 1: the position stands still from row 0 on while the tool turns",
+        match=r"row 1: the position is constant from row 0 on while the tool turns",
     ):
         without_repetitions(points(position, yaw))
     with pytest.raises(TaskError, match="all rows have the same position"):
@@ -123,7 +123,7 @@ def test_rounding_is_told_from_scatter():
     message = str(caught.value)
     for text in (
         "too rough",
-        "its curvature would be noise",
+        "the curvature would be noise",
         "rounded to 1e-06 m at 0.",
         "tolerance: {position:",
     ):

@@ -129,7 +129,7 @@ def test_long_straight_ways_are_straight():
     position = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.2]]])
     (curve,), report = fit_curves(points(position), tolerance(0.2 * MM))
     assert any(
-        "taken as straight: 2 gaps longer than 5 times the usual spacing" in told
+        "treated as straight: 2 gaps longer than 5 times the usual spacing" in told
         for told in report.told
     )
     on_line = curve.spline(np.linspace(0.02, 0.48, 100))

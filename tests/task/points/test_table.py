@@ -48,7 +48,7 @@ def test_forms_are_found_out(text, told):
 def test_units_in_the_header(header):
     points, told = read(f"{header}\n1,2,3\n4,5,6\n")
     assert_allclose(points.position, np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]) / 1e3)
-    assert told == ("length in mm, as the header says",)
+    assert told == ("length in mm, as stated in the header",)
 
 
 def test_units_of_the_task():

@@ -1,4 +1,4 @@
-"""Comparison of a recorded motion with the motion planned along the same path within the same limits."""
+"""Comparison of a recorded motion with a motion planned along the same path and within the same limits."""
 
 from brachis.apps.comparison.comparison import (
     Comparison,

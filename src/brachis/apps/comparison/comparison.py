@@ -1,4 +1,4 @@
-"""Plan a motion along the path of a recorded one, and compare both motions."""
+"""Plan a motion along the path of a recorded motion, and compare the two."""
 
 from __future__ import annotations
 
@@ -35,14 +35,15 @@ _IMPLAUSIBLE_SPEED = 10.0
 
 @dataclass(frozen=True)
 class Use:
-    """How much of a limit both motions use.
+    """Fraction of a limit that the recorded motion and the plan use.
 
     Attributes
     ----------
     limit : str
         Name of the limit.
     recorded : float
-        Largest ratio to the limit that the rows of the recorded motion prove; 1 is the limit. See `RatioBounds`.
+        Largest ratio to the limit that the rows of the recorded motion prove; at 1 the limit is reached. See
+        `RatioBounds`.
     recorded_at : str
         Joint that has this ratio, or the tool.
     recorded_time : float
@@ -65,7 +66,7 @@ class Use:
 
     @property
     def recorded_text(self) -> str:
-        """How much of the limit the recorded motion uses for certain, and how much it may use."""
+        """Fraction of the limit that the recorded motion certainly uses, and fraction that it may use, as text."""
         proven = f"{100.0 * self.recorded:.1f} %"
         possible = f"{100.0 * self.recorded_up_to:.1f} %"
         if proven == possible:
@@ -73,7 +74,7 @@ class Use:
         return f"{proven}, between the rows up to {possible}"
 
     def __str__(self) -> str:
-        """Say how much of the limit both motions use, and where."""
+        """Return the fraction of the limit that each motion uses, and where, as text."""
         return (
             f"{self.limit}: {self.recorded_text} used by the recorded motion ({self.recorded_at}), "
             f"{100.0 * self.planned:.1f} % in the plan ({self.planned_at})"
@@ -87,11 +88,11 @@ class Comparison(Summary):
     Attributes
     ----------
     recorded : Trajectory
-        The recorded motion, with the path recovered from it.
+        The recorded motion and the path recovered from it.
     verification : Verification
         Verification of the recorded motion, as interpolated from its rows.
     proven : tuple of RatioBounds
-        Ratios that its rows alone prove, limit by limit.
+        For each limit, the ratios that the recorded rows alone prove.
     result : Result
         Result of the plan along the same path, within the same limits.
 
@@ -114,7 +115,7 @@ class Comparison(Summary):
 
     @property
     def recovered(self) -> Recovered:
-        """How the path was found, and what is known of the recorded motion."""
+        """How the path was recovered, and what is known about the recorded motion."""
         assert self.recorded.recovered is not None
         return self.recorded.recovered
 
@@ -125,7 +126,7 @@ class Comparison(Summary):
 
     @property
     def uses(self) -> tuple[Use, ...]:
-        """How much of every limit both motions use."""
+        """Fraction of each limit that the two motions use."""
         proven = {bounds.limit: bounds.worst for bounds in self.proven}
         interpolated = {check.name: check.value for check in self.verification.checks}
         uses = []
@@ -145,7 +146,7 @@ class Comparison(Summary):
 
     @property
     def verdict(self) -> str:
-        """The gain in time, in one line."""
+        """One line about the time that the plan saves."""
         times = f"{self.result.t_end:.4f} s instead of {self.recorded.t_end:.4f} s"
         if not self.result.verified:
             return f"no verified motion was found along the recorded path ({times})"
@@ -154,7 +155,7 @@ class Comparison(Summary):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Remarks on the recorded motion that matter besides the times."""
+        """Remarks on the recorded motion, in addition to the times."""
         remarks = [
             f"the recorded motion exceeds the {use.limit} limit of {use.recorded_at} by "
             f"{100.0 * (use.recorded - 1.0):.2g} % at {use.recorded_time:.4f} s, as its rows prove, and "
@@ -169,7 +170,7 @@ class Comparison(Summary):
             )
         if self.recorded.task.spline.rest != "full":
             remarks.append(
-                "the recorded rows begin or end with an acceleration, so the plan may do so as well (rest: velocity)"
+                "the recorded motion begins or ends with an acceleration, so the plan may do so too (rest: velocity)"
             )
         return tuple(remarks)
 
@@ -182,7 +183,7 @@ class Comparison(Summary):
         }
 
     def __str__(self) -> str:
-        """Return the whole comparison as text."""
+        """Return the comparison as text."""
         uses = map(str, self.uses)
         return "\n".join([self.verdict, *self.remarks, *uses, *self.recovered.told])
 
@@ -223,10 +224,10 @@ def compare(
     keep_end: bool = False,
     listener: Listener | None = None,
 ) -> Comparison:
-    """Plan the path of a recorded motion within the same limits, from the same start posture, and compare.
+    """Plan along the path of a recorded motion, within the same limits and from the same posture, and compare.
 
-    If the first plan is slower than the recorded motion, a finer one is made. If that is slower too, the recorded joint
-    path is given a new timing. The fastest verified motion is used.
+    If the first plan is slower than the recorded motion, a plan with more intervals follows. If this plan is slower
+    too, a new timing of the recorded joint path is computed. The fastest verified motion is used.
 
     Parameters
     ----------
@@ -235,10 +236,10 @@ def compare(
     robot, task, task_space, units, tolerance, noise : optional
         As in `brachis.import_motion`; only allowed for files.
     keep_end : bool, optional
-        Whether the plan also ends in the recorded end posture. Otherwise it may end in any posture with the tool at the
+        Whether the plan must end in the recorded end posture. Otherwise it may end in any posture with the tool at the
         end of the path.
     listener : callable, optional
-        Called with a text about each step.
+        Function that is called with a text about each step.
 
     Returns
     -------
@@ -247,9 +248,9 @@ def compare(
     Raises
     ------
     InputError
-        As `brachis.import_motion` and `brachis.plan`.
+        As for `brachis.import_motion` and `brachis.plan`.
     PlanningError
-        No plan could be made.
+        No plan was found.
 
     Examples
     --------
@@ -294,7 +295,7 @@ def compare(
 
 
 def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
-    """Yield tasks for a recorded path. Each is meant for the case that the previous tasks gave no faster motion."""
+    """Yield tasks for a recorded path; each one is for the case that the previous ones gave no faster motion."""
     task = recorded.task
     if not keep_end:
         task = task.model_copy(update={"end": "free"})
@@ -307,13 +308,13 @@ def tasks_of(recorded: Trajectory, *, keep_end: bool) -> Iterator[Task]:
     if task.task_space != JOINTS:
         try:
             path = joint_path_of(recorded)
-        except PathError:  # the previous plans are used
+        except PathError:  # the fastest of the previous plans is used
             return
         yield task.model_copy(update={"task_space": JOINTS, "path": path})
 
 
 def plot_both_motions(comparison: Comparison) -> Figure:
-    """Plot the path coordinate, the tool speed, and the largest ratio to any limit of both motions over time.
+    """Plot path coordinate, tool speed and the largest ratio to any limit over time, for both motions.
 
     For the recorded motion, the line is the ratio that its rows prove. The band above it reaches up to the ratio of the
     motion interpolated from the rows.
@@ -355,7 +356,7 @@ def plot_both_motions(comparison: Comparison) -> Figure:
                 color=colour,
                 alpha=0.25,
                 linewidth=0.0,
-                label="recorded, between its rows: up to",
+                label="recorded, between rows: up to",
             )
             largest = known
         ratio.plot(t, largest, **look)

@@ -1,12 +1,12 @@
 """Ratios to limits that the rows of a recorded motion prove, whatever happens between the rows.
 
-A joint that moves by dq within a period h has the velocity dq / h at some time within it. Within two periods it has an
-acceleration equal to the second difference over h^2, and within three periods a jerk equal to the third difference over
-h^3 (mean value theorem of divided differences). A limit on one of these is therefore certainly exceeded where the
-differences exceed it. A limit on another quantity (a torque, the tool's speed) is compared with its value for these
-means, at the posture in the middle of the periods; changes of posture and velocity within the periods are
-neglected. The amount that errors of the rows may add to a ratio is subtracted. These errors matter less over longer
-periods, so several periods are also combined into one.
+A joint that moves by dq within a period h has the velocity dq / h at some time within this period. Within two periods
+it has an acceleration equal to the second difference over h^2, and within three periods a jerk equal to the third
+difference over h^3 (mean value theorem of divided differences). If such a difference exceeds a limit, the motion
+certainly exceeds this limit. A limit on another quantity, such as a torque or the tool speed, is compared with the
+value that results from these means at the posture in the middle of the periods. Changes of posture and velocity within
+the periods are neglected. The amount that errors of the rows may add to a ratio is subtracted. Because these errors
+matter less over longer periods, several periods are also combined into one.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class RatioBounds:
     limit : str
         Name of the limit.
     subjects : tuple of str
-        Subjects of the limit's c values: joints, or the tool.
+        Subjects of the c values of the limit: joints, or the tool.
     t : (K,) ndarray
         Times of the rows, s.
     ratios : (K, c) ndarray
-        Sizes of the ratios that are certainly reached; 0 where nothing is proven.
+        Magnitudes of the ratios that are certainly reached; 0 where nothing is proven.
     """
 
     limit: str
@@ -44,14 +44,14 @@ class RatioBounds:
 
     @property
     def worst(self) -> tuple[float, str, float]:
-        """Largest ratio, its subject, and its time, s."""
+        """The largest ratio, its subject, and its time, s."""
         row, column = np.unravel_index(np.argmax(self.ratios), self.ratios.shape)
         ratio = float(self.ratios[row, column])
         return ratio, self.subjects[column], float(self.t[row])
 
 
 def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
-    """Compute the ratios that the rows of an imported motion prove, for every limit of its task."""
+    """Compute, for every limit of the task, the ratios that the rows of an imported motion prove."""
     assert trajectory.recovered is not None
     t = trajectory.recovered.rows[:, 0]
     bounds = []
@@ -63,7 +63,7 @@ def bound_ratios(trajectory: Trajectory) -> tuple[RatioBounds, ...]:
 
 
 def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndarray:
-    """Return the sizes of the ratios to one limit that the rows at times t prove, (K, c)."""
+    """Return the magnitudes of the ratios to one limit, (K, c), that the rows at times t prove."""
     ratios = np.zeros((len(t), len(limit.labels)))
     first_row, _ = _differentiate(trajectory, np.zeros((1, 1), dtype=int))
     slopes = limit.partials(first_row).by_joints
@@ -71,7 +71,7 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
     one_sided = np.where(np.isfinite(limit.upper), -np.inf, np.inf)
     harmless = np.where(np.isfinite(limit.centre), limit.centre, one_sided)
     is_mean = limit.guarantee.is_mean
-    # Numbers of periods combined into one. Tool limits may change along the path, so for them only one period.
+    # Numbers of periods combined into one. Tool limits may change along the path, so their periods are not combined.
     strides = (1, 2, 4) if limit.role is Role.ROBOT and not is_mean else (1,)
     for stride in strides:
         first = np.arange(max(len(t) - order * stride, 0))[:, None]
@@ -99,14 +99,14 @@ def _bound_limit(trajectory: Trajectory, t: np.ndarray, limit: Limit) -> np.ndar
 def _differentiate(
     trajectory: Trajectory, windows: np.ndarray
 ) -> tuple[Moments, np.ndarray]:
-    """Differentiate the polynomials through m + 1 rows each, in the middle of windows of rows, (W, m + 1).
+    """Differentiate the polynomial through each window of m + 1 rows, (W, m + 1), in the middle of the window.
 
     Returns
     -------
     Moments
         The m-th derivative is m! times the divided difference; higher derivatives are 0.
     (4, W, n) ndarray
-        Largest amounts that errors of the rows add to q and to each derivative.
+        Largest amounts that errors of the rows can add to q and to each derivative.
     """
     recovered = trajectory.recovered
     assert recovered is not None

@@ -1,4 +1,4 @@
-"""A recording of a run, in the units of a controller, beside the plan that it ran."""
+"""Comparison of a recorded run, in the units of a controller, with the plan that was run."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from brachis.trajectory import MotionSource, motion_of
 
 @dataclass(frozen=True, repr=False)
 class AxisTracking:
-    """How far one joint was from the plan.
+    """Deviation of one joint from the plan.
 
     Attributes
     ----------
     joint, axis : str
-        Names in the URDF and in the controller.
+        Names of the joint in the URDF and of the axis in the controller.
     largest, rms : float
-        Largest and root-mean-square error of the joint, in `unit`.
+        Largest error and root-mean-square error of the joint, in `unit`.
     time : float
-        Of the largest error, s of the plan.
+        Time of the largest error in the plan, s.
     unit : str
-        Of the axis: ``rad``, ``deg``, ``m`` or ``mm``.
+        Unit of the axis: ``rad``, ``deg``, ``m`` or ``mm``.
     torque : float or None
-        Largest difference of the torque, Nm or N; None if it was not recorded.
+        Largest difference between the torques, Nm or N; None if the torque was not recorded.
     """
 
     joint: str
@@ -45,7 +45,7 @@ class AxisTracking:
 
 @dataclass(frozen=True, repr=False)
 class Tracking(Summary):
-    """Where a machine differed from the plan that it ran.
+    """Deviations of a machine from the plan that it ran.
 
     Attributes
     ----------
@@ -55,9 +55,9 @@ class Tracking(Summary):
     t_end, t_end_planned : float
         Durations of the motion in the recording and in the plan, s.
     tool : float
-        Largest distance of the tool from its place in the plan, m.
+        Largest distance of the tool from its planned position, m.
     tool_time : float
-        When, s of the plan.
+        Time of the largest distance in the plan, s.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class Tracking(Summary):
         return {**vars(self), "axes": [vars(axis) for axis in self.axes]}
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the entries shown to the user."""
         rows = {
             f"{axis.joint} ({axis.axis})": f"{axis.largest:.3g} {axis.unit} at {axis.time:.4g} s, "
             f"root mean square {axis.rms:.3g} {axis.unit}"
@@ -110,20 +110,21 @@ def compare_run(
     Parameters
     ----------
     recorded : path
-        CSV file: time, a column for each axis (``A1``, ``q_A1 [deg]``, ...), and torques (``tau_A1``) if known.
+        CSV file with the time, a column for each axis (``A1``, ``q_A1 [deg]``, ...) and, if known, torques
+        (``tau_A1``).
     planned : Trajectory, Result or path
         The motion that was run.
     profile : Profile, str or path
-        Names and units of the axes.
+        Profile with the names and units of the axes.
     units : mapping, optional
         Units that differ from the profile's, as for `import_motion`.
 
     Raises
     ------
     TaskError
-        The file is not understood; the message names line and column.
+        The file cannot be read; the message names line and column.
     InputError
-        The profile does not fit the robot, or the run has nothing to do with the plan.
+        The profile does not fit the robot, or the recording is not a run of the plan.
 
     Examples
     --------
@@ -147,11 +148,11 @@ def compare_run(
     t = recording.t
 
     def plan_at(delay: float) -> np.ndarray:
-        """Return the times of the plan, (K,), s, with a delay of the run."""
+        """Return the times in the plan, (K,), s, for a delay of the run."""
         return np.clip(t - delay, 0.0, motion.t_end)
 
     def miss(delay: float) -> float:
-        """Return the mean of the joints' errors; one that is large for a while does not shift the others."""
+        """Return the mean error of the joints; a single large error hardly shifts it."""
         errors = q - motion.position(plan_at(delay))[:, axes.index]
         return float(np.mean(np.abs(errors)))
 
@@ -169,10 +170,10 @@ def compare_run(
     if errors.max() > 1.0:
         joint = axes.joints[int(np.argmax(errors.max(axis=0)))]
         raise InputError(
-            "this is not a run of the plan",
+            "this recording is not a run of the plan",
             where=str(recorded),
-            found=f"{joint} is {errors.max():.3g} rad or m away from the plan",
-            allowed="less than 1 rad or m; check profile and units",
+            found=f"{joint} deviates by {errors.max():.3g} rad or m from the plan",
+            allowed="less than 1 rad or m; check the profile and the units",
         )
     torques = None
     if recording.tau is not None and motion.robot.has_masses:

@@ -1,4 +1,4 @@
-"""Controllers: in which units they take a motion, how they move between samples, and which limits they check.
+"""Profiles of controllers: the units they expect, how they move between samples, and the limits they check.
 
 Examples
 --------

@@ -1,4 +1,4 @@
-"""Axes of a controller, bound to the joints of a robot: positions in the controller's units and back."""
+"""The axes of a controller, bound to the joints of a robot, with conversion of positions in both directions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from brachis.errors import InputError, check_names
 from brachis.robot import Robot
 
 FACTORS = {"rad": 1.0, "deg": 180.0 / np.pi, "m": 1.0, "mm": 1e3}
-"""Units of axes, and their factors on rad or m."""
+"""Units of axes, and the factors that convert rad or m to them."""
 
 
 _SINGULAR = 1e-9
-"""Determinant of couplings from which joints cannot be found."""
+"""Determinant below which couplings do not determine the joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +31,15 @@ class ControllerAxes:
     units : tuple of str
         ``rad``, ``deg``, ``m`` or ``mm``.
     external : tuple of bool
-        Whether an axis is external.
+        Whether each axis is external.
     joints : tuple of str
-        Joints of the robot.
+        Joint of the robot that each axis moves.
     index : (m,) int ndarray
-        Numbers of the joints in the robot's chain.
+        Indices of these joints in the robot's chain.
     zero : (m,) ndarray
-        Positions of the joints where uncoupled axes are at 0, rad or m.
+        Position of each joint at which its axis, without coupling, is at 0, rad or m.
     matrix : (m, m) ndarray
-        Values of the axes are ``matrix @ (q - zero)``, in their units.
+        The axis values are ``matrix @ (q - zero)``, in the units of the axes.
     """
 
     names: tuple[str, ...]
@@ -51,7 +51,7 @@ class ControllerAxes:
     matrix: np.ndarray
 
     def encode(self, q: np.ndarray) -> np.ndarray:
-        """Return the values of the axes, (K, m), in postures (K, n), rad or m."""
+        """Return the axis values, (K, m), at postures (K, n), rad or m."""
         return (q[:, self.index] - self.zero) @ self.matrix.T
 
     def encode_rates(self, rates: np.ndarray) -> np.ndarray:
@@ -59,11 +59,11 @@ class ControllerAxes:
         return rates[:, self.index] @ self.matrix.T
 
     def decode(self, values: np.ndarray) -> np.ndarray:
-        """Return the positions of the axes' joints, (K, m), rad or m, from values of the axes, (K, m)."""
+        """Return the positions of the joints that the axes move, (K, m), rad or m, from axis values, (K, m)."""
         return np.linalg.solve(self.matrix, values.T).T + self.zero
 
     def encode_torques(self, tau: np.ndarray) -> np.ndarray:
-        """Return the torques of the axes, (K, m), Nm or N, that do the work of torques of the joints, (K, n)."""
+        """Return the torques of the axes, (K, m), Nm or N, that have the same power as joint torques, (K, n)."""
         factors = np.array([FACTORS[unit] for unit in self.units])
         slopes = self.matrix / factors[:, None]
         return np.linalg.solve(slopes.T, tau[:, self.index].T).T
@@ -75,7 +75,7 @@ class ControllerAxes:
 
     @property
     def position_units(self) -> tuple[str, ...]:
-        """Units of the axes, which those of a recording's columns are unless their header states others."""
+        """Units of the axes; columns of a recording have the same units unless their header states others."""
         return self.units
 
 
@@ -85,9 +85,9 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
     Raises
     ------
     UnknownNameError
-        An axis names a joint that the robot does not have, or a coupling an axis that does not exist.
+        An axis names a joint that the robot does not have, or a coupling names an axis that does not exist.
     InputError
-        A joint has two axes, the arm's axes are not in the order of the chain, or a group has too few names.
+        A joint has two axes, the axes of the arm are not in chain order, or a group has fewer names than axes.
     """
     names = robot.urdf_joints
     units = dict(zip(names, robot.position_units, strict=False))
@@ -113,7 +113,7 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
     in_order = [name for name in names if name in arm]
     if arm != in_order:
         raise InputError(
-            "the arm's axes are not in the order of the chain",
+            "the axes of the arm are not in the order of the chain",
             where="profile.axes",
             found=", ".join(arm),
             allowed=", ".join(in_order),
@@ -149,12 +149,12 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
 
 
 def profile_unit(group: AxisGroup, unit: str) -> str:
-    """Return a group's unit of axes whose joints have the SI unit ``rad`` or ``m``."""
+    """Return the unit that a group uses for axes whose joints have the SI unit ``rad`` or ``m``."""
     return group.angle if unit == "rad" else group.length
 
 
 def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, ...]:
-    """Return an axis for each joint, the arm's first; sliding joints before the first turning one are external."""
+    """Return an axis for each joint, those of the arm first; linear joints before the first rotary one are external."""
     slides = list(takewhile(lambda name: units[name] == "m", names))
     arm = [name for name in names if name not in slides]
     if not arm:
@@ -164,7 +164,7 @@ def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, 
 
 
 def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
-    """Return the axes' names: their own, else the next ones of their groups, else the joints'."""
+    """Return the name of each axis: its own, otherwise the next one of its group, otherwise that of its joint."""
     groups = {False: profile.arm, True: profile.external}
     unused = {kind: iter(group.names) for kind, group in groups.items()}
     names = []

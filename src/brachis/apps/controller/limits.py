@@ -1,4 +1,4 @@
-"""Limits of a controller as limits of a robot."""
+"""Adding the limits of a controller to those of a robot."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from brachis.task.limit_models import FROM_URDF, map_by_joint
 
 
 def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> Robot:
-    """Return a robot with the stricter ones of its limits and a profile's.
+    """Return a robot in which each limit is the stricter of its own and that of the profile.
 
     Raises
     ------
     InputError
-        A list of the profile has another length than the arm has axes, or the limits do not fit the robot.
+        A list in the profile does not have one value per axis of the arm, or the limits do not fit the robot.
     """
     arm = [
         joint

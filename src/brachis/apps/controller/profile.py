@@ -1,4 +1,4 @@
-"""Profiles of controllers, from YAML files."""
+"""Profiles of controllers, which are read from YAML files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from brachis.task.yaml_reader import read_yaml
 
 _FOLDER: Final = Path(__file__).with_name("profiles")
 _LARGEST = 100_000
-"""Bytes of a profile."""
+"""Maximum size of a profile, bytes."""
 
 AngleUnit = Literal["rad", "deg"]
 LengthUnit = Literal["m", "mm"]
@@ -42,44 +42,44 @@ class Axis(Model):
     """One axis of the controller, and the joint of the URDF that it moves."""
 
     joint: Name
-    """Joint of the URDF."""
+    """Joint name in the URDF."""
     name: Name | None = None
-    """Name. Default: the next one of arm or external."""
+    """Axis name. Default: the next one of arm or external."""
     sign: Literal[-1, 1] = 1
-    """-1: the axis turns against the joint."""
+    """-1: axis and joint turn in opposite directions."""
     zero: Number = 0.0
-    """Position of the joint where the axis is 0, rad (m)."""
+    """Position of the joint at which the axis is 0, rad (m)."""
     external: Flag = False
     """Whether the axis is external, such as a rail."""
 
 
 class AxisGroup(Model):
-    """Names and units of the arm's axes, or of the external ones."""
+    """Names and units of the axes of the arm, or of the external axes."""
 
     names: tuple[Name, ...] = ()
-    """Names, in order. Default: those of the joints."""
+    """Names of the axes, in order. Default: joint names."""
     angle: AngleUnit = "rad"
-    """Unit of turning axes, rad or deg."""
+    """Unit of rotary axes, rad or deg."""
     length: LengthUnit = "m"
-    """Unit of sliding axes, m or mm."""
+    """Unit of linear axes, m or mm."""
 
 
 class Language(Model):
-    """The language of a controller's programs of positions."""
+    """The language in which programs of positions are written for a controller."""
 
     suffix: Annotated[Name, Field(pattern=r"^\.[a-z0-9]+$")]
-    """Suffix of its files."""
+    """Suffix of the program file."""
     external_axes: Flag = True
-    """Whether a position may have external axes."""
+    """Whether positions can include external axes."""
     template: Name
-    """Jinja template with the variables name (of the motion), robot, title, date, t_end (s), is_linear,
-    report.positions, report.place (m, rad), report.time (s), axes.names, axes.units, axes.external, velocities (largest
-    of the axes, by the URDF) and steps. A step has values (in the axes' units), duration (s), speed (m/s), percent (of
-    velocities), zone (m; 0: stop) and event."""
+    """Jinja template. Variables: name (of the motion), robot, title, date, t_end (s), is_linear, report.positions,
+    report.place (m, rad), report.time (s), axes.names, axes.units, axes.external, velocities (maxima of the axes from
+    the URDF), steps. Each step has values (in axis units), duration (s), wait (s; 0: a move), speed (m/s), percent (of
+    velocities), passes (whether the arm does not stop), zone (m), event."""
 
 
 class Profile(CheckedModel):
-    """How a controller takes a motion, and what it makes of it.
+    """Description of a controller: the motions that it accepts, and how it runs them.
 
     Examples
     --------
@@ -92,11 +92,11 @@ class Profile(CheckedModel):
     brachis_profile: Version
     """Version of the format."""
     title: Name
-    """Name of the controller and its interface."""
+    """Name of controller and interface."""
     sources: NonEmpty[Name]
     """Sources of the figures."""
     unknown: tuple[Name, ...] = ()
-    """What is not documented in public."""
+    """Facts that are not publicly documented."""
     period: Annotated[Positive, Field(le=0.1)]
     """Time between samples, s."""
     fixed_period: Flag = True
@@ -104,38 +104,38 @@ class Profile(CheckedModel):
     interpolation: Literal["hold", "linear", "cubic", "quintic"]
     """Motion between samples: hold, linear (straight joint lines), cubic, or quintic (with accelerations)."""
     formats: NonEmpty[Name] = ("csv",)
-    """Export formats that the controller takes."""
+    """Accepted export formats."""
     columns: NonEmpty[Literal["q", "qd", "qdd", "tau"]] = ("q",)
-    """Columns of tables: q, qd, qdd, tau."""
+    """Quantities in tables: q, qd, qdd, tau."""
     arm: AxisGroup = AxisGroup()
     """Names and units of these axes."""
     external: AxisGroup = AxisGroup()
     """Names and units of these axes."""
     axes: tuple[Axis, ...] = ()
-    """Axes, in the controller's order. Default: the arm's joints, then, as external axes, sliding ones before them."""
+    """Axes, in the controller's order. Default: the arm joints, then linear joints before them as external axes."""
     coupled: dict[Name, dict[Name, Number]] = Field(default_factory=dict)
-    """Multiples of axes that are added to others: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
+    """Multiples of other axes to add: {J3: {J2: -1}} if J3 is the angle above the horizontal."""
     program: Language | None = None
     """Language of programs of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
-    """Limits that the controller checks, as in robot.limits; lists in the order of the arm's axes."""
+    """Limits that the controller checks, as in robot.limits; lists in the order of the arm axes."""
     rest: Literal["velocity", "full"] = "velocity"
-    """What must be zero at both ends: velocity, or full (the acceleration too)."""
+    """Derivatives that must be zero at both ends: velocity, or full (also the acceleration)."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
-    """Decimals of positions in tables. Null: all digits."""
+    """Number of decimals of positions in tables. Null: all digits."""
     path_tolerance: Positive = 1e-4
-    """Largest deviation of the tool from the path, m and rad."""
+    """Maximum deviation of the tool from the path, m and rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
-    """Instructions where a process speed begins and ends: {process_on: ..., process_off: ...}."""
+    """Instructions at the begin and end of a process speed: {process_on: ..., process_off: ...}."""
 
     @property
     def is_sampled(self) -> bool:
-        """Whether only the samples are known, and not what is between them."""
+        """Whether the motion is known only at the samples, not between them."""
         return self.interpolation in ("hold", "linear")
 
     @property
     def last(self) -> str:
-        """Time of the last sample; see `Trajectory.sample`."""
+        """How the time of the last sample is chosen; see `Trajectory.sample`."""
         return "hold" if self.is_sampled else "exact"
 
     def _mistakes(self) -> Iterator[Mistake]:
@@ -151,11 +151,11 @@ class Profile(CheckedModel):
                 yield f"limits.{kind}", problem, "robot.limits in the task"
         for name in self.events:
             if name not in EVENTS:
-                yield "events", "there is no event of this name", ", ".join(EVENTS)
+                yield "events", "there is no event with this name", ", ".join(EVENTS)
 
 
 EVENTS: Final = ("process_on", "process_off")
-"""Events of a motion."""
+"""Names of the events in a motion."""
 
 
 def profile_names() -> list[str]:
@@ -176,8 +176,8 @@ def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
     Parameters
     ----------
     source : str, path or Profile
-        Name of an included profile, or a YAML file. A file may begin with ``extends: NAME`` and state only what differs
-        from the profile NAME.
+        Name of an included profile, or a YAML file. A file may begin with ``extends: NAME`` and then state only the
+        keys that differ from the profile NAME.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def load_profile(source: str | os.PathLike[str] | Profile) -> Profile:
 
 
 def _read(path: Path, where: str) -> Any:
-    """Read the keys of a profile, with those of the profile that it extends."""
+    """Read the keys of a profile, merged with the keys of the profile that it extends."""
     check_kind(path, "a profile", TaskError)
     text = read_text(path, where=where, folder=Path.cwd(), largest=_LARGEST)
     content = read_yaml(text, str(path))

@@ -1,8 +1,8 @@
-"""The motion as a controller will run it: sampled, rounded, interpolated as the profile says, and verified again.
+"""The motion as a controller will run it: sampled, rounded, interpolated as in the profile, and verified again.
 
-Between samples of positions alone (``hold``, ``linear``) the drives decide what happens. The limits are then checked at
-the samples, with differences of successive samples in place of derivatives, as controllers do; the tool is checked on
-the straight joint lines between samples too.
+If the controller receives only positions (``hold``, ``linear``), the drives determine the motion between samples. The
+limits are then checked at the samples, with differences of successive samples in place of derivatives, as controllers
+do. The tool is also checked on the straight joint lines between samples.
 """
 
 from __future__ import annotations
@@ -39,33 +39,33 @@ from brachis.verify.motion import CheckedMotion, MotionStates
 from brachis.verify.verify import path_errors
 
 _MOVING = 1e-6
-"""Joint velocity above which a motion does not rest, rad/s or m/s."""
+"""Joint velocity below which an end of a motion counts as at rest, rad/s or m/s."""
 _STILL = 1e-9
-"""A joint that moves less than this stands still, rad or m."""
+"""A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
-"""Largest acceleration at rest, as a fraction of the largest of the motion."""
+"""Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
 _CHORD_STEPS = 4
-"""Steps on a straight joint line between two samples."""
+"""Number of steps in which the straight joint line between two samples is checked."""
 _SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2)
-"""Factors on the duration that are tried when a run fails."""
+"""Factors on the duration to try when a run fails."""
 _SHORTER = (2, 4, 8)
-"""Fractions of the period that are tried when a run fails."""
+"""Divisors of the period to try when a run fails."""
 
 
 @dataclass(frozen=True, repr=False)
 class RunReport(Summary):
-    """What a controller will make of a motion.
+    """Verification of a motion as a controller will run it.
 
     Attributes
     ----------
     controller : str
         Name of the controller and its interface.
     period : float
-        s.
+        Time between samples, s.
     verification : Verification
-        Limits of the task and of the profile, the path, and the ends.
+        Checks of the limits of the task and of the profile, of the path, and of both ends.
     remedies : tuple of str
-        What would let the run pass, each verified; empty if it passes.
+        Changes, each of which is verified to make the run pass; empty if it passes anyway.
 
     Examples
     --------
@@ -87,7 +87,7 @@ class RunReport(Summary):
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What failed, in words."""
+        """Failed checks, in words."""
         return self.verification.failures
 
     def to_dict(self) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class RunReport(Summary):
         return {"passed": self.passed, **data}
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown: every check with its worst value."""
+        """Return the entries shown to the user: every check with its worst value."""
         return {
             "controller": f"{self.controller}, every {1e3 * self.period:g} ms",
             **self.verification.summary(),
@@ -113,28 +113,29 @@ def verify_run(
 ) -> RunReport:
     """Verify a motion as a controller will run it.
 
-    Factors in ``robot.limits.scale`` are margins for what the controller adds to the plan: the run is checked against
-    the limits without them.
+    The run is checked against the limits without the factors in ``robot.limits.scale``, because these are margins for
+    deviations that the controller adds to the plan.
 
     Parameters
     ----------
     trajectory : Trajectory, Result or path
     profile : Profile, str or path
-        See `load_profile`.
+        Profile of the controller; see `load_profile`.
     period : float, optional
-        Time between samples, s. The profile's unless given.
+        Time between samples, s. By default the period of the profile.
     own_limits : sequence of LimitModel, optional
-        Limits of the user's own with which the motion was planned.
+        The user's own limits with which the motion was planned.
 
     Returns
     -------
     RunReport
-        A run that fails raises nothing; `failures` says what fails, and `remedies` what would do.
+        A failed run raises no error: `failures` lists the failed checks, and `remedies` the changes that help.
 
     Raises
     ------
     InputError
-        The profile does not fit the robot, a joint that moves has no axis, or the controller takes no other period.
+        The profile does not fit the robot, a joint that moves has no axis, or the controller does not accept the
+        period.
 
     Examples
     --------
@@ -155,18 +156,18 @@ def verify_run(
 
 
 def check_period(profile: Profile, period: float | None) -> float:
-    """Return the period, s, that a controller is given; the profile's unless it is stated.
+    """Return the period of the samples for a controller, s; by default the period of the profile.
 
     Raises
     ------
     InputError
-        The controller takes no other period than its own.
+        The controller accepts only its own period.
     """
     if period is None or period == profile.period:
         return profile.period
     if profile.fixed_period:
         raise InputError(
-            "the controller takes no other period",
+            "the controller does not accept this period",
             where="dt",
             found=f"{period:g} s",
             allowed=f"{profile.period:g} s ({profile.title})",
@@ -175,7 +176,7 @@ def check_period(profile: Profile, period: float | None) -> float:
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
-    """Return the axes of a profile for a motion's robot.
+    """Return the axes of a profile, bound to the robot of a motion.
 
     Raises
     ------
@@ -210,7 +211,7 @@ def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A motion, and how it is run."""
+    """A motion and the way a controller runs it."""
 
     motion: Trajectory
     profile: Profile
@@ -219,7 +220,7 @@ class _Run:
     own_limits: tuple[LimitModel, ...]
 
     def verify(self, period: float) -> Verification:
-        """Verify the run with a period, s."""
+        """Verify the run with a given period, s."""
         samples = self.motion.sample(period, last=self.profile.last)
         q = samples.q.copy()
         if self.profile.decimals is not None:
@@ -250,11 +251,11 @@ class _Run:
 
 
 class _SampledMotion(CheckedMotion):
-    """A motion that is known at its nodes only."""
+    """A motion that is known only at its nodes."""
 
     @cached_property
     def states(self) -> MotionStates:
-        """The motion at its nodes."""
+        """States of the motion at its nodes."""
         last = len(self.pieces.lengths) - 1
         index = np.append(np.arange(last + 1), last)
         u = np.zeros(last + 2)
@@ -272,15 +273,15 @@ def interpolate(
     motion : Trajectory
         The plan.
     samples : Samples
-        At K times.
+        Samples of the plan at K times.
     q : (K, n) ndarray
-        Positions that the controller is given, rad or m.
+        Positions sent to the controller, rad or m.
     interpolation : {"hold", "linear", "cubic", "quintic"}
 
     Returns
     -------
     Trajectory
-        Its path coordinate is the plan's; it waits at the end until the last sample.
+        The interpolated motion, with the path coordinate of the plan. It waits at the end until the last sample.
     """
     t = samples.t
     h = np.diff(t)[:, None]
@@ -321,7 +322,7 @@ def interpolate(
 def _central_differences(
     t: np.ndarray, q: np.ndarray, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocities and accelerations, (K, n), at samples; `ends`, (2, n), are the velocities at both ends."""
+    """Return velocities and accelerations, (K, n), at the samples; `ends`, (2, n), are the velocities at both ends."""
     h = np.diff(t)[:, None]
     slopes = np.diff(q, axis=0) / h
     qdot = np.empty_like(q)
@@ -335,7 +336,7 @@ def _central_differences(
 
 
 def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
-    """Check the distance of the tool from the path, on straight joint lines between samples where there is no other."""
+    """Check the distance of the tool from the path, between bare samples along straight joint lines."""
     t = motion.states.t
     q = motion.states.q
     if isinstance(motion, _SampledMotion):
@@ -347,7 +348,7 @@ def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
         motion.task_map.values(q), motion.path.sample(s).target
     )
     along = motion.path.sample(s).xi
-    # A tool that is early or late on the path is not off the path.
+    # A tool that is early or late on the path has not left the path.
     shift = np.einsum("kc,kc->k", miss, along) / np.einsum("kc,kc->k", along, along)
     errors = path_errors(motion, q, s + shift, joint_placements(motion.robot, q))
     worst = int(np.argmax(errors))
@@ -373,7 +374,7 @@ def _check_differences(
         lower, upper = robot.limits.both_ways(kind)
         if not np.isfinite(upper).any():
             continue
-        # The controller holds the first position before, and the last one afterwards.
+        # The controller holds the first position before the motion, and the last one after it.
         held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
         rates = np.diff(held, order, axis=0) / period**order
         ratios = np.maximum(rates / upper, rates / lower)
@@ -393,7 +394,7 @@ def _check_differences(
 
 
 def _check_tool_speed(robot: Robot, run: Trajectory, allowed: float) -> Iterator[Check]:
-    """Check the distances between the tool's places at successive samples, divided by the period."""
+    """Check the distances between tool positions at successive samples, divided by the period."""
     s = run.path_coordinate(run.times)
     largest = largest_speeds(run.task, s, np.maximum)
     if np.isinf(largest).all():
@@ -424,7 +425,7 @@ def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
 
 
 def _find_remedies(run: _Run, period: float) -> Iterator[str]:
-    """Yield what lets a run pass, each verified."""
+    """Yield changes that let a run pass, each of them verified."""
     profile = run.profile
     trials: list[list[tuple[str, _Run, float]]] = [[], [], []]
     for decimals in range(10 if profile.decimals is None else profile.decimals, 10):
@@ -442,11 +443,11 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
         passing = (text for text, trial, dt in group if trial.verify(dt).passed)
         for text in islice(passing, 1):
             yield f"the motion passes with {text}"
-    yield "to plan a motion that passes, give the profile to the plan (--profile)"
+    yield "to plan a motion that passes, plan with the profile (--profile)"
 
 
 def slow_down(motion: Trajectory, factor: float) -> Trajectory:
-    """Return the motion, slower by a factor on its duration."""
+    """Return the motion slowed down by a factor on its duration."""
     return replace(
         motion,
         times=motion.times * factor,

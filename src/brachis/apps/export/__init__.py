@@ -1,4 +1,4 @@
-"""Trajectories in the formats of other programs; a format is a function here and a row of `FORMATS`.
+"""Export of trajectories to other programs. Each format is a function in this package and a row of `FORMATS`.
 
 Examples
 --------
@@ -32,4 +32,4 @@ __all__ = [
     "write",
     "write_for_controller",
 ]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # names offered for completion

@@ -1,7 +1,7 @@
-"""Animations: a robot that moves over its path, as GIF or, by ffmpeg, as MP4.
+"""Animations of a robot that moves along its path, as GIF or, through ffmpeg, as MP4.
 
-Matplotlib's own writers draw every picture anew, which takes six times as long and makes GIFs five times as large:
-here only what moves is drawn anew, and a GIF has one palette.
+Matplotlib's own writers redraw every picture, which takes six times as long and makes GIFs five times as large. Here
+only moving parts are redrawn, and a GIF has a single palette.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 def frames(
     trajectory: Trajectory, times: np.ndarray, slower: float = 1.0
 ) -> Iterator[tuple[Figure, np.ndarray]]:
-    """Yield the figure, ever the same one, and its pixels, (height, width, 4) uint8, at every time.
+    """Yield the figure, always the same object, and its pixels, (height, width, 4) uint8, at every time.
 
-    The robot moves over its tool's path and over postures at regular times, with the time written above. Beside it are
-    the limits that hold the motion, torques for example, with a line at the time.
+    The robot moves in front of its tool path and a few of its postures, with the time above. Beside it are
+    plots of active limits, for example torques, with a line at the current time.
 
     Parameters
     ----------
     trajectory : Trajectory
     times : (K,) ndarray
-        s.
+        Times of the pictures, s.
     slower : float, optional
-        How many times slower the motion is played, which is written above.
+        How many times slower than real time the motion is played; this is written above the picture.
     """
     figure = style.new_figure(style.PAGE_WIDTH, 88.0)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -77,7 +77,7 @@ def frames(
     pace = f", {slower:g} times slower" if slower != 1.0 else ""
     title = figure.suptitle(f"t{pace}", fontsize=style.LABEL_SIZE)
     canvas.draw()
-    # The engine would find the same layout for every picture anew.
+    # The layout is the same for all pictures, so the engine need not compute it again.
     figure.set_layout_engine("none")
     title.set_animated(True)
     canvas.draw()
@@ -97,7 +97,7 @@ def frames(
 
 
 Film = tuple[Iterator[np.ndarray], float]
-"""Pictures of a motion, (height, width, 3) uint8, and for how long each is shown, s."""
+"""Pictures of a motion, (height, width, 3) uint8, and the time for which each is shown, s."""
 
 
 def film_of(
@@ -113,18 +113,18 @@ def film_of(
     ----------
     trajectory : Trajectory
     dt : float
-        Period at which pictures are shown, s.
+        Time for which each picture is shown, s.
     step : float
-        Of which the format's periods are multiples, s.
+        The period must be a multiple of this time, s.
     joints : sequence of str or None
-        None: an animation shows the whole robot.
+        Must be None, because an animation shows the whole robot.
     slower : float
-        How many times slower than in real time the motion goes.
+        How many times slower than real time the motion is played.
 
     Raises
     ------
     InputError
-        The period or the joints do not fit.
+        The period is not possible, or joints are given.
     """
     if joints is not None:
         raise InputError(
@@ -163,7 +163,7 @@ def film_of(
 
 
 def write_gif(film: Film, stream: BinaryIO) -> None:
-    """Write a film that is shown again and again; the last picture stands for 1 s."""
+    """Write a film that repeats endlessly; the last picture is shown for 1 s."""
     pillow = require_library("PIL.Image", "a GIF", library="Pillow", extra="plots")
     pictures, period = film
     images = [pillow.fromarray(picture) for picture in pictures]
@@ -183,7 +183,7 @@ def write_gif(film: Film, stream: BinaryIO) -> None:
 
 
 def write_mp4(film: Film, stream: BinaryIO) -> None:
-    """Let ffmpeg write a film.
+    """Write a film with ffmpeg.
 
     Raises
     ------
@@ -198,12 +198,12 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
         )
     pictures, period = film
     first = next(pictures)
-    # H.264 halves the colours' resolution, so that width and height are even.
+    # H.264 halves the resolution of colours, so width and height must be even.
     height, width = (2 * (size // 2) for size in first.shape[:2])
     source = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 1000/{round(1e3 * period)} -i -"
     target = "-an -pix_fmt yuv420p -movflags +faststart"
     with tempfile.TemporaryDirectory(prefix="brachis-") as folder:
-        # A file with a name: MP4 is not written from its beginning to its end.
+        # MP4 needs a named file, because it is not written from beginning to end.
         file = Path(folder) / "film.mp4"
         arguments = f"-v error -nostdin {source} {target}".split()
         with subprocess.Popen(  # noqa: S603  (no shell, and nothing of the user's in the arguments)
@@ -212,7 +212,7 @@ def write_mp4(film: Film, stream: BinaryIO) -> None:
             stderr=subprocess.PIPE,
         ) as process:
             assert process.stdin is not None
-            with suppress(BrokenPipeError):  # the messages say more
+            with suppress(BrokenPipeError):  # its messages give the reason
                 for picture in chain([first], pictures):
                     process.stdin.write(picture[:height, :width].tobytes())
             _, messages = process.communicate()

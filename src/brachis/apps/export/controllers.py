@@ -1,7 +1,7 @@
 """Formats of controllers: ROS 2's ``JointTrajectory`` and URScript.
 
-The message of ROS 2 is written as YAML for ``ros2 topic pub``, or in an MCAP bag. A
-URScript program gives Universal Robots' arms one ``servoj`` command a period.
+The ROS 2 message is written as YAML for ``ros2 topic pub``, or in an MCAP bag. A URScript program gives an arm by
+Universal Robots one ``servoj`` command per period.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ MESSAGE: Final = "trajectory_msgs/msg/JointTrajectory"
 
 
 def message_of(rows: JointRows) -> dict[str, Any]:
-    """Return the message's fields.
+    """Return the fields of the message.
 
-    ``effort`` stays empty: `joint_trajectory_controller` refuses trajectories that have it where no joint is driven by
-    effort. Times are whole nanoseconds.
+    ``effort`` stays empty, because `joint_trajectory_controller` refuses trajectories with it unless joints are driven
+    by effort. Times are in whole nanoseconds.
     """
     if not {"rad", "m"}.issuperset(rows.units):
         raise InputError(
-            "JointTrajectory takes rad and m",
+            "JointTrajectory needs rad and m",
             where="units",
             found=", ".join(dict.fromkeys(rows.units)),
         )
@@ -56,7 +56,7 @@ def write_ros2_yaml(rows: JointRows, stream: BinaryIO) -> None:
 
 
 TOPIC: Final = "/joint_trajectory_controller/joint_trajectory"
-"""Topic on which ros2_control's controller listens."""
+"""Topic to which the controller of ros2_control listens."""
 
 _DEFINITION = """\
 std_msgs/Header header
@@ -81,13 +81,13 @@ uint32 nanosec
 MSG: builtin_interfaces/Duration
 int32 sec
 uint32 nanosec"""
-"""The message and its parts, as bags describe them."""
+"""Definition of the message and its parts, as stored in bags."""
 
 
 def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
     """Write a bag with one message on `TOPIC`, at time zero.
 
-    Its metadata ``brachis`` name joints that move and are left out.
+    The metadata ``brachis`` of the bag name the moving joints that are left out.
     """
     writers = require_library("mcap_ros2.writer", "an MCAP bag")
     with writers.Writer(stream) as writer:
@@ -98,28 +98,28 @@ def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
 
 
 _SERVOJ = "0.03, 300"
-"""The shortest lookahead time of servoj, s, and its proportional gain, the default of its manual."""
+"""Lookahead time of servoj, s (the shortest), and its proportional gain (the default of the manual)."""
 
 
 def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
-    """Write a program with one ``servoj`` a period, which leads to its row's posture.
+    """Write a program with one ``servoj`` per period, which leads to the posture of one row.
 
-    The program halts with a message if the arm is not at the start posture, and moves nothing then.
+    If the arm is not at the start posture, the program shows a message and halts without moving it.
 
     Raises
     ------
     InputError
-        There are other joints than six revolute ones; an arm on a rail is written with its six as `joints`, and the
-        rail, which its own controller moves at the same time, in another format.
+        The joints are not exactly six revolute ones. For an arm on a rail, pass the arm's six joints as `joints`, and
+        write the rail, which its own controller moves at the same time, in another format.
     """
     if rows.units != ("rad",) * 6:
         named = zip(rows.joints, rows.units, strict=True)
         raise InputError(
-            "servoj takes the angles of six joints",
+            "servoj needs the angles of six joints",
             where="joints",
             found=", ".join(f"{name} ({unit})" for name, unit in named),
-            allowed="six revolute joints, from the base on",
-            hint="List only the arm's six joints in joints, and write a rail in another format. With a profile, hold "
+            allowed="six revolute joints, starting at the base",
+            hint="List only the six joints of the arm in joints, and write a rail in another format. With a profile, hold "
             "the rail (robot.locked_joints)",
         )
     first, *postures = (

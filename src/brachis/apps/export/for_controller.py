@@ -1,4 +1,4 @@
-"""Motions in the units, the period and the format of a controller, verified as it runs them."""
+"""Motions in the units, period and format of a controller, verified as the controller runs them."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from brachis.trajectory import MotionSource, Trajectory, motion_of
 from brachis.verify import verify_trajectory
 
 PROGRAM = "program"
-"""Name of the format of programs of positions, in the language of the profile."""
+"""Name of the format for programs of positions in the language of the profile."""
 
 
 class RunWarning(BrachisWarning):
-    """A motion breaks limits as a controller runs it."""
+    """A motion exceeds limits when the controller runs it."""
 
 
 def write_for_controller(
@@ -59,33 +59,33 @@ def write_for_controller(
     path : path
         File to write. Its suffix sets the format.
     profile : Profile, str or path
-        See `brachis.load_profile`.
+        Profile of the controller; see `brachis.load_profile`.
     form : str, optional
         Name of the format; ``program`` for a program of positions.
     dt : float, optional
-        Period of samples, s. The profile's unless given.
+        Period of samples, s. By default the period of the profile.
     moves : {"joint", "linear"}, optional
-        Of programs: what moves on straight lines between positions, the joints or the tool.
+        For programs: whether the joints or the tool move on straight lines between positions.
     tolerance, time_tolerance : float, optional
-        Of programs: how far the tool may be from the path, m and rad, and how late or early it may be, s.
+        For programs: maximum distance of the tool from the path, m and rad, and maximum difference in time, s.
     own_limits : sequence of LimitModel, optional
-        Limits of the user's own with which the motion was planned.
+        The user's own limits with which the motion was planned.
 
     Returns
     -------
     RunReport or ProgramReport
-        The verification of the samples as the controller runs them; or how far a program is from the motion.
+        For samples, their verification as the controller runs them; for a program, its deviation from the motion.
 
     Raises
     ------
     InputError
-        The profile does not fit the robot, or takes no such format or period; a joint that moves has no axis; no
-        program keeps the tolerances; or the file cannot be written.
+        The profile does not fit the robot, or does not allow the format or the period; a joint that moves has no axis;
+        no program is within the tolerances; or the file cannot be written.
 
     Warns
     -----
     RunWarning
-        The motion breaks limits as the controller runs it. The file is written.
+        The motion exceeds limits when the controller runs it. The file is still written.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def write_for_controller(
     name = next((name for name, known in FORMATS.items() if known is chosen), form)
     if chosen is None or name not in allowed:
         raise InputError(
-            "the controller takes no such format",
+            "the controller does not accept this format",
             where="format",
             found=name,
             allowed=f"{', '.join(allowed)} ({profile.title})",

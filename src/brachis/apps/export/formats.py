@@ -1,4 +1,4 @@
-"""The formats, in one table."""
+"""The table of export formats."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class Format:
     Attributes
     ----------
     about : str
-        What it is, in a few words.
+        Short description of the format.
     suffix : str
-        By which it is known, with the dot.
+        File suffix, with the dot.
     beginning : bytes
-        Pattern of how its files begin; a file that begins otherwise is never overwritten.
+        Pattern of the beginning of files in this format; a file that begins differently is never overwritten.
     writer : callable
-        Writes `JointRows`, or the `Film` of an animation, to a binary stream.
+        Function that writes `JointRows`, or the `Film` of an animation, to a binary stream.
     dt : float
         Default period, s.
     last : {"exact", "hold"}
-        Default last sample; see `Trajectory.sample`.
+        Default for the last sample; see `Trajectory.sample`.
     step : float or None
-        Of an animation: periods are multiples of it, s.
+        For an animation, the period must be a multiple of this time, s.
     """
 
     about: str
@@ -88,7 +88,7 @@ FORMATS: dict[str, Format] = {
     # GIF counts time in hundredths of a second.
     "gif": Format("animation", ".gif", rb"GIF8", write_gif, dt=0.04, step=0.01),
     "mp4": Format(
-        "animation, where ffmpeg is installed",
+        "animation (needs ffmpeg)",
         ".mp4",
         rb"\x00{3}[\x1c\x20]ftyp",
         write_mp4,
@@ -96,11 +96,11 @@ FORMATS: dict[str, Format] = {
         step=1e-3,
     ),
 }
-"""Formats by name."""
+"""Export formats by name."""
 
 
 def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
-    """Return the format with a name, or the one of a file's suffix.
+    """Return the format with a given name, or the format that belongs to the suffix of a file.
 
     Raises
     ------
@@ -144,28 +144,29 @@ def write(
     trajectory : Trajectory, Result or path
         A motion, or its file.
     path : path
-        File to write. An older one is replaced if it begins as brachis writes this format, and kept if writing fails.
+        File to write. An existing file is replaced if it begins like a file of this format by brachis, and kept if
+        writing fails.
     form : str, optional
-        Name of the format; that of the suffix unless given.
+        Name of the format. By default the suffix decides.
     dt : float, optional
-        Period, s. Samples are at 0, dt, 2 dt, ... The format's unless given.
+        Period, s, by default that of the format. Samples are at 0, dt, 2 dt, ...
     last : {"exact", "hold"}, optional
-        The last sample: at t_end exactly, so that the last period may be shorter; or at the first multiple of `dt` that
-        is not before t_end, with the end posture held at rest there. See `Trajectory.sample`. The format's unless
-        given.
+        Time of the last sample, by default that of the format; see `Trajectory.sample`. ``exact``: at t_end, so that
+        the last period may be shorter. ``hold``: at the first multiple of `dt` at or after t_end, at rest in the end
+        posture.
     joints : sequence of str, optional
-        Joints to write, in this order: a controller may drive but some. All of the robot unless given. A joint that
-        moves and is left out is warned of, and named in the file.
+        Joints to write, in this order, because a controller may drive only some. By default all joints of the robot. If
+        a joint that moves is left out, there is a warning, and the file names the joint.
     slower : float, optional
         How many times slower an animation shows the motion.
     degrees, mm : bool, optional
-        Write angles in degrees, or lengths in mm.
+        Whether to write angles in degrees, or lengths in mm.
 
     Raises
     ------
     InputError
-        The format is unknown or cannot hold the motion, `dt` or `last` cannot be used, a joint is given twice, a
-        library is missing, or the file cannot be written or is not of brachis.
+        The format is unknown or cannot represent the motion, `dt` or `last` cannot be used, a joint is given twice, a
+        library is missing, the file cannot be written, or it exists and is not by brachis.
     UnknownNameError
         A format or a joint does not exist.
 

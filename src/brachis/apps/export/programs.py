@@ -1,9 +1,9 @@
 """Programs of positions: the fewest joint or linear instructions that follow a motion within a tolerance.
 
-All positions are those of the controller's axes, so that no frame, tool or configuration is needed. The nominal
-interpolation is what a controller does if nothing slows it down. Between two positions the joints, or for linear
-instructions the tool's pose, move on a straight line at a constant speed, in the time that the motion takes there.
-Corners are rounded by parabolas, over `BLEND` times the shorter neighbouring time to each side. Where the arm rests, it
+Positions are given as values of the controller's axes, so no frame, tool or configuration is needed. The nominal
+interpolation is the motion of the controller if nothing slows it down. Between two positions the joints, or for linear
+instructions the tool pose, move on a straight line at constant speed, in the same time as the motion. Corners are
+rounded by parabolas that extend to each side over `BLEND` times the shorter neighbouring time. Next to a rest, the arm
 speeds up or slows down over `BLEND` times the time of the line.
 """
 
@@ -26,39 +26,40 @@ from brachis.robot import Robot, bind
 from brachis.trajectory import Trajectory
 
 BLEND = 0.25
-"""Half of the time of a corner's parabola, as a fraction of the shorter neighbouring time."""
+"""Half of the duration of the parabola at a corner, as a fraction of the shorter neighbouring time."""
 _POINTS = 1000
 """Number of times at which the motion is compared with the program."""
 _STRICTER = 0.7
-"""Factor on the tolerances of single lines if the corners exceed them."""
+"""Factor by which the tolerances of single lines are reduced if rounded corners exceed the tolerances."""
 _ROUNDS = 12
 _FARTHER = 8
-"""Length of the longest line that is tried, over that of the line before."""
+"""Maximum ratio of the duration of a line to that of the previous line."""
 _MOST = 500
-"""Largest number of positions of a program."""
+"""Maximum number of positions in a program."""
 _LINE_STEPS = 20
-"""Number of steps in which an arm follows a line of the tool."""
+"""Number of steps in which the arm is followed along a line of the tool."""
 _NEWTON_STEPS = 4
+"""Number of Newton iterations in each of these steps."""
 _SAME_POSTURE = 1e-3
-"""Largest difference of joints in the same posture, rad."""
+"""Maximum difference between the joints of two postures that count as the same, rad."""
 _REST = 1e-6
-"""Joint velocity at rest, rad/s or m/s."""
+"""Joint velocity below which the arm counts as at rest, rad/s or m/s."""
 _SLOW = 1e-3
-"""Path velocity, as a fraction of the mean one, below which times are not compared."""
+"""Path velocity, as a fraction of the mean path velocity, below which times are not compared."""
 
 
 @dataclass(frozen=True, repr=False)
 class ProgramReport(Summary):
-    """How far a program of positions is from the motion, by its nominal interpolation.
+    """Deviation of a program of positions, interpolated nominally, from the motion.
 
     Attributes
     ----------
     positions : int
         Number of positions.
     place : float
-        Largest distance of the tool from the path, m, or angle, rad.
+        Largest deviation of the tool from the path, m or rad.
     time : float
-        Largest difference of the times at which places of the path are passed, s.
+        Largest difference between the times at which program and motion pass a point of the path, s.
     failures : tuple of str
         Limits of the task or the profile that the plan exceeds, in words.
     """
@@ -78,7 +79,7 @@ class ProgramReport(Summary):
         return dict(vars(self))
 
     def summary(self) -> Mapping[str, object]:
-        """Return what is shown."""
+        """Return the entries shown to the user."""
         return {
             "positions": self.positions,
             "deviation in place": f"{self.place:.3g} m, rad",
@@ -105,28 +106,28 @@ def write_program(
     profile : Profile
     axes : ControllerAxes
     name : str
-        Of the motion, for the program's head.
+        Name of the motion, for the head of the program.
     moves : {"joint", "linear"}, optional
-        What moves on straight lines between positions: the joints or the tool.
+        Whether the joints or the tool move on straight lines between positions.
     tolerance : float, optional
-        Largest distance of the tool from the path, m, and angle, rad.
+        Maximum deviation of the tool from the path, in m and in rad.
     time_tolerance : float, optional
-        Largest difference in time, s.
+        Maximum difference in time, s.
 
     Raises
     ------
     InputError
-        No program keeps the tolerances, or the language has no place for external axes.
+        No program is within the tolerances, or the language does not support external axes.
     """
     check_names("kind of moves", [moves], ("joint", "linear"), "moves")
     language = profile.program
     assert language is not None
     if any(axes.external) and not language.external_axes:
         raise InputError(
-            "the language has no external axes",
+            "the language does not support external axes",
             where="profile.axes",
             found=", ".join(axes.names),
-            allowed="joints of the arm alone",
+            allowed="only the joints of the arm",
         )
     jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
     sandbox = require_library("jinja2.sandbox", "a program", extra="report")
@@ -144,7 +145,7 @@ def write_program(
         share *= _STRICTER
     if not passes:
         raise InputError(
-            "no program of positions keeps the tolerance",
+            "no program of positions is within the tolerance",
             where="tolerance",
             found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
             allowed=f"up to {_MOST} positions",
@@ -210,12 +211,12 @@ def _largest_velocities(robot: Robot) -> np.ndarray:
 
 
 class _Follower:
-    """Compares straight lines between positions of a motion with the motion.
+    """Comparison of a motion with straight lines between its positions.
 
     Attributes
     ----------
     t : (K,) ndarray
-        s.
+        Times of the comparison, s.
     """
 
     def __init__(self, motion: Trajectory, *, is_linear: bool) -> None:
@@ -232,10 +233,10 @@ class _Follower:
         self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
 
     def choose(self, tolerance: float, time_tolerance: float) -> np.ndarray:
-        """Choose positions, (N,) indices of times, each as far away as a line within the tolerances reaches."""
+        """Choose the positions, (N,) indices of times, with lines as long as the tolerances allow."""
 
         def fits(first: int, last: int) -> bool:
-            """Return whether a line between two times keeps the tolerances."""
+            """Return whether the line between two times is within the tolerances."""
             nodes = np.array([first, last])
             place, time = self.deviate(nodes, self.t[first : last + 1])
             return place <= tolerance and time <= time_tolerance
@@ -244,7 +245,7 @@ class _Follower:
         for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
             while nodes[-1] < end and len(nodes) <= _MOST:
                 first = nodes[-1]
-                # Longer lines may fit though shorter ones do not: the search begins far away.
+                # A longer line may fit where a shorter one does not, so the search begins far away.
                 before = first - nodes[-2] if first else end
                 high = min(end, first + _FARTHER * before)
                 low = high
@@ -258,13 +259,13 @@ class _Follower:
         return np.array(nodes)
 
     def deviate(self, nodes: np.ndarray, t: np.ndarray) -> tuple[float, float]:
-        """Return the largest deviations at times, (k,), from the path, m or rad, and from the motion's time, s."""
+        """Return the largest deviations from the path, m or rad, and from the motion's timing, s, at times (k,)."""
         rests = self.rests[nodes]
         values = nominal(self.t[nodes], self.followed[nodes], rests, t)
         if not self.is_linear:
             values = self.task_map.values(values)
         s = self.motion.path_coordinate(t)
-        for _ in range(2):  # to the nearest place on the path
+        for _ in range(2):  # to the nearest point of the path
             s = np.clip(s + self._step(values, s), 0.0, 1.0)
         miss = self.task_map.difference(values, self.path.sample(s).target)
         moves = np.append(True, np.diff(self.s) > 0.0)
@@ -273,7 +274,7 @@ class _Follower:
         return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
 
     def _step(self, values: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the step, (k,), along the path towards task coordinates, (k, c)."""
+        """Return the step along the path, (k,), towards given task coordinates, (k, c)."""
         sample = self.path.sample(s)
         miss = self.task_map.difference(values, sample.target)
         along = sample.xi
@@ -349,22 +350,22 @@ class _Follower:
 def nominal(
     times: np.ndarray, nodes: np.ndarray, rests: np.ndarray, t: np.ndarray
 ) -> np.ndarray:
-    """Return the nominal motion through nodes, (N, c), at times t, (k,); see the module's docstring.
+    """Return the nominal motion through nodes, (N, c), at times t, (k,); see the docstring of the module.
 
     Parameters
     ----------
     times : (N,) ndarray
-        Of the nodes, s.
+        Times of the nodes, s.
     nodes : (N, c) ndarray
     rests : (N,) bool ndarray
-        Where the motion is at rest.
+        Whether the motion is at rest at each node.
     t : (k,) ndarray
         s.
     """
     h = np.diff(times)
     before = np.append(0.0, h)
     after = np.append(h, 0.0)
-    # A line that begins at rest begins later by half of the time in which it speeds up.
+    # A line from rest starts later by half of the time in which it speeds up.
     early = 0.5 * BLEND * before * rests
     late = 0.5 * BLEND * after * rests
     corners = np.stack([times - early, times + late], axis=1).ravel()

@@ -1,4 +1,4 @@
-"""What a controller is given: the motion of a robot's joints at regular times."""
+"""Rows for a controller: the motion of the joints of a robot at regular times."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from brachis.trajectory import Samples, Trajectory
 from brachis.trajectory.samples import COLUMNS
 
 _PER = {"q": "", "qd": "/s", "qdd": "/s^2", "tau": None}
-"""What follows the unit of the position in the units of a table's columns; torques are in SI units."""
+"""Suffix of the position's unit in the units of each kind of column; torques are in SI units."""
 
 
 class LeftOutWarning(BrachisWarning):
-    """A joint that moves is not written to the exported file."""
+    """A joint that moves is missing from the exported file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class JointRows:
     joints : tuple of str
         Names of the joints, or of the controller's axes, in the order of the columns.
     units : tuple of str
-        Of their positions: ``rad`` or ``m``, ``deg`` or ``mm``.
+        Units of their positions: ``rad`` or ``m``, ``deg`` or ``mm``.
     left_out : tuple of str
         A sentence for every joint that moves and is not among `joints`.
     t_end, dt : float
@@ -45,7 +45,7 @@ class JointRows:
     samples : Samples
         The motion of these joints, in their units, and of the tool.
     quantities : tuple of str
-        What a table shows of the joints: prefixes of `COLUMNS`.
+        Quantities in a table, as prefixes of `COLUMNS`.
     """
 
     joints: tuple[str, ...]
@@ -57,7 +57,7 @@ class JointRows:
     quantities: tuple[str, ...] = tuple(COLUMNS)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns, (K,), of a table by name: ``t``, then those of every joint; units but SI are named."""
+        """Return the columns of a table, (K,), by name: ``t``, then those of the joints with units except SI."""
         columns = {"t": self.samples.t}
         for prefix, quantity in self.samples.columns.items():
             if prefix not in self.quantities:
@@ -71,7 +71,7 @@ class JointRows:
         return columns
 
     def in_units(self, *, degrees: bool, mm: bool) -> JointRows:
-        """Return the rows with angles in degrees, or lengths in mm."""
+        """Return the rows with angles in degrees, lengths in mm, or both."""
         shown = {"rad": "deg" if degrees else "rad", "m": "mm" if mm else "m"}
         units = tuple(shown[unit] for unit in self.units)
         factors = np.array([FACTORS[unit] for unit in units])
@@ -96,9 +96,9 @@ def rows_of(
     dt : float
         Period, s.
     last : {"exact", "hold"}
-        See `Trajectory.sample`.
+        How the last sample is chosen; see `Trajectory.sample`.
     joints : sequence of str or None
-        Which, in which order; None: all that the robot has, which virtual ones are not.
+        Joints to sample, in this order. None: all joints of the robot, without virtual ones.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def rows_of(
     Warns
     -----
     LeftOutWarning
-        A joint that moves is not among them.
+        A joint that moves is not among `joints`.
     """
     names = trajectory.joint_names
     real = names[: len(trajectory.robot.urdf_joints)]
@@ -153,15 +153,15 @@ def rows_of(
 def require_library(
     module: str, user: str, *, library: str = "", extra: str = "export"
 ) -> ModuleType:
-    """Import a module of a library that only an extra brings.
+    """Import a module of a library that only an extra installs.
 
     Parameters
     ----------
     module : str
     user : str
-        What needs it.
+        Feature that needs the library, for the message.
     library : str, optional
-        Its name if the module's first part is not.
+        Name of the library, if it is not the first part of the module name.
     extra : str, optional
 
     Raises

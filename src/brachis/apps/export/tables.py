@@ -1,8 +1,7 @@
 """Tables of samples in SI units: CSV, Parquet and JSON.
 
-CSV has one row per sample, with the shortest digits that read back exactly. Parquet has
-the same columns as doubles, with units and the robot's name as metadata. JSON names its
-schema.
+CSV has one row per sample, with numbers as short as exact reading allows. Parquet has the same columns as doubles, with
+units and the name of the robot as metadata. JSON names its schema.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from brachis.apps.export.rows import JointRows, require_library
 
 
 def write_csv(rows: JointRows, stream: BinaryIO) -> None:
-    """Write time, joint positions, velocities, accelerations and torques.
+    """Write a CSV table of time, joint positions, velocities, accelerations and torques.
 
     The header is ``t``, then ``q_<joint>`` of all joints, ``qd_<joint>``, ``qdd_<joint>`` and ``tau_<joint>``, in
     s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N); torques are left out if the URDF has no masses. If a joint
@@ -29,16 +28,16 @@ def write_csv(rows: JointRows, stream: BinaryIO) -> None:
     text.writelines(f"# brachis: {sentence}\n" for sentence in rows.left_out)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    # Floats are written as repr: the shortest text that reads back the same.
+    # repr gives the shortest text that reads back as the same float.
     writer.writerows(np.column_stack([*columns.values()]).tolist())
     stream.write(text.getvalue().encode())
 
 
 def write_parquet(rows: JointRows, stream: BinaryIO) -> None:
-    """Write the table of `write_csv` as Parquet.
+    """Write the same table as `write_csv`, as Parquet.
 
-    The file's metadata have a key ``brachis``: joints with their units, the end time in s, and sentences about joints
-    that move and are left out.
+    The metadata key ``brachis`` contains the joints with their units, the end time in s, and sentences about moving
+    joints that are left out.
     """
     pyarrow = require_library("pyarrow", "a Parquet file")
     parquet = require_library("pyarrow.parquet", "a Parquet file")
@@ -163,7 +162,7 @@ def samples_schema() -> dict[str, Any]:
 
 
 def write_json(rows: JointRows, stream: BinaryIO) -> None:
-    """Write samples as JSON that fulfils `samples_schema`."""
+    """Write samples as JSON that conforms to `samples_schema`."""
     names = ("t", "s", *rows.samples.columns.values())
     content = {
         "$schema": SCHEMA_ID,

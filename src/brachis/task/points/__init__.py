@@ -1,4 +1,4 @@
-"""Paths from CAM: reading and checking tables of points and G-code, and fitting smooth curves within a tolerance.
+"""Paths from CAM: points and G-code are read and checked, and smooth curves are fitted within a tolerance.
 
-The package works on numbers alone and knows neither task nor robot; `brachis.task.fitted` makes segments of its curves.
+The package works only on numbers, without task and robot; `brachis.task.fitted` turns its curves into segments.
 """

@@ -1,6 +1,6 @@
-"""Checks of points, with the row of a mistake: repetitions, spikes, changes of unit; and their scatter.
+"""Checks of points for repetitions, spikes and changes of unit, with the row of each mistake; and their scatter.
 
-Scatter is measured from a smooth curve. It matters because of the curvature that it gives a curve through all points.
+Scatter is the deviation from a smooth curve. It matters because it adds curvature to a curve through all points.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from brachis.task.points.points import (
 )
 
 SAME = 1e-9
-"""Largest step that counts as standing still, m or rad."""
+"""Maximum step that counts as standing still, m or rad."""
 _MEDIANS = {1: 0.6745, 2: 1.1774, 3: 1.5382}
-"""Median distance from zero of normally distributed points, by their dimension, in standard deviations."""
+"""Median distance of normally distributed points from zero, in standard deviations, by their dimension."""
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Scatter of points.
+    """Scatter of points about a smooth curve.
 
     Attributes
     ----------
     deviation : float
-        Standard deviation across the path, m; 0 if the points look smooth or are too few to tell.
+        Standard deviation across the path, m; 0 if the points look smooth, or are too few to tell.
     turning : float
-        Standard deviation of each component of the orientations, or of yaw, rad; 0 as above.
+        Standard deviation of each component of the orientations, or of yaw, rad; 0 in the same cases.
     spacing : float
         Median distance of successive points, m.
     decimals : int or None
@@ -50,19 +50,19 @@ class Scatter:
     decimals: int | None
 
     def noisy(self, tolerance: FitTolerance) -> bool:
-        """Return whether a curve through all points would follow scatter that is not small beside a tolerance."""
+        """Return whether a curve through all points would follow scatter that is not small relative to a tolerance."""
         return self.deviation > 0.0 or self.turning > 0.1 * tolerance.orientation
 
     @property
     def curvature(self) -> float:
-        """Standard deviation, 1/m, of the curvature that scatter alone gives a curve through all points."""
+        """Standard deviation of the curvature that scatter alone adds to a curve through all points, 1/m."""
         if not self.deviation:
             return 0.0
         # The second difference of white noise with standard deviation 1 has a standard deviation of sqrt(6).
         return 6.0**0.5 * self.deviation / self.spacing**2
 
     def __str__(self) -> str:
-        """Describe the scatter in words."""
+        """Return a description of the scatter for messages."""
         spacing = f"at {1e3 * self.spacing:.3g} mm spacing"
         rounding = 0.0 if self.decimals is None else 10.0**-self.decimals
         if rounding / 12.0**0.5 > self.deviation / 3.0:
@@ -74,7 +74,8 @@ def scatter_of(points: Points) -> Scatter:
     """Estimate the scatter of points.
 
     Each point is compared with the cubic, over chord lengths, through its two neighbours on either side. For positions
-    only the difference across the path counts. With noise successive differences alternate, with curvature they do not.
+    only the difference across the path counts. With noise, successive differences alternate in sign; with curvature
+    they do not.
     """
     position = points.position
     turning = points.turning
@@ -89,7 +90,7 @@ def scatter_of(points: Points) -> Scatter:
     deviation = _deviation(across, _MEDIANS[points.dimension - 1])
     of_turning = 0.0
     if turning.shape[1]:
-        # Differences of quaternions are half the angle and have three dimensions; for yaw they are the angle itself.
+        # Differences of quaternions are half the angle, in three dimensions; differences of yaw are the angle itself.
         dimension, factor = (3, 2.0) if points.has_quaternions else (1, 1.0)
         residuals = _residuals(turning, chords)
         of_turning = factor * _deviation(residuals, _MEDIANS[dimension])
@@ -97,7 +98,7 @@ def scatter_of(points: Points) -> Scatter:
 
 
 def _deviation(residuals: Array, unit_median: float) -> float:
-    """Return the standard deviation of residuals, (n, c), if they look like noise, otherwise zero."""
+    """Return the standard deviation of residuals, (n, c), if they look like noise; otherwise zero."""
     sizes = np.linalg.norm(residuals, axis=1)
     median = float(np.median(sizes))
     if median == 0.0:
@@ -120,7 +121,7 @@ def decimals_of(position: Array) -> int | None:
 
 
 def _residuals(values: Array, chords: Array) -> Array:
-    """Return the differences of values, (n, c), from local cubics, (n - 4, c), scaled to the scatter of one value."""
+    """Return the differences, (n - 4, c), of values, (n, c), from local cubics, scaled to the scatter of one value."""
     count = len(values)
     u = sum_up(np.maximum(chords, 1e-12 * chords.max()))
     inner = np.arange(2, count - 2)
@@ -138,19 +139,19 @@ def _residuals(values: Array, chords: Array) -> Array:
 
 
 def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
-    """Leave out points that repeat their predecessors to a small fraction of a tolerance, m, and note which ones.
+    """Leave out points that repeat their predecessors to within a fraction of a tolerance, m, and note their rows.
 
     Raises
     ------
     TaskError
-        The position stands still while the tool turns, or in the whole file.
+        The position stays the same while the tool turns, or in the whole file.
     """
     again = 1 + np.flatnonzero(is_repeated(points.steps, 0.01 * tolerance))
     turned = angles_between(points.turning[again], points.turning[again - 1])
     for i in again[turned > SAME].tolist():
         raise points.wrong(
             i,
-            f"the position stands still from {points.name_row(i - 1)} on while the tool turns",
+            f"the position is constant from {points.name_row(i - 1)} on while the tool turns",
             allowed="rows with different positions",
             hint="Use separate segments for a turn on the spot: csv, turn, csv",
         )
@@ -166,14 +167,14 @@ def without_repetitions(points: Points, tolerance: float = 0.0) -> Points:
         return points
     count = write_count(len(again), "row")
     rows = name_first([str(row) for row in points.rows[again]], ", ", count=5)
-    note = f"left out {count} at the position of the row before: {points.row}s {rows}"
+    note = f"left out {count} at the position of the previous row: {points.row}s {rows}"
     return replace(remaining, notes=(*remaining.notes, note))
 
 
 def refuse_repetitions(points: Points) -> None:
-    """Refuse a row with the position of its predecessor: a curve through all points would have to stop there.
+    """Refuse a row with the same position as its predecessor, because a curve through all points would stop there.
 
-    If the position stands still in the whole file, the tool turns on the spot, and the angles are compared instead.
+    If the position is constant in the whole file, the tool turns on the spot, and the angles are compared instead.
 
     Raises
     ------
@@ -195,7 +196,7 @@ def refuse_repetitions(points: Points) -> None:
 
 
 def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
-    """Refuse a point that is far from the line between its neighbours, and points where the unit seems to change.
+    """Refuse points far from the line between their neighbours, and points at which the unit seems to change.
 
     Raises
     ------
@@ -225,9 +226,9 @@ def refuse_spikes(points: Points, scatter: Scatter, tolerance: float) -> None:
 
 
 def plausibility_note(points: Points) -> str | None:
-    """Return a remark if the whole path looks like mm instead of m or vice versa; None if it does not."""
+    """Return a remark if the whole path seems to be in mm instead of m or vice versa; otherwise None."""
     extent = float(np.linalg.norm(np.ptp(points.position, axis=0)))
-    if extent > 100.0:  # paths of robots are shorter
+    if extent > 100.0:  # longer than paths of robots
         return f"the path is {extent:.4g} m long and wide: is it in mm? Set units: {{length: mm}}"
     if extent < 1e-4:
         return f"the path is {1e3 * extent:.4g} mm long and wide: is it in m? Set units: {{length: m}}"
@@ -235,7 +236,7 @@ def plausibility_note(points: Points) -> str | None:
 
 
 def _refuse_factors(points: Points) -> None:
-    """Refuse a step after which all coordinates are a thousand times larger or smaller."""
+    """Refuse a step at which all coordinates become a thousand times larger or smaller."""
     before = points.position[:-1]
     after = points.position[1:]
     is_far = points.steps > 20.0 * np.median(points.steps)
@@ -247,5 +248,5 @@ def _refuse_factors(points: Points) -> None:
                 i + 1,
                 f"the coordinates are a thousand times {word} than in {points.name_row(i)}",
                 allowed=f"coordinates close to {points.describe(i)}",
-                hint="Are mm and m mixed, or is a decimal point missing? Write all rows in one unit",
+                hint="Check for mixed mm and m, or a missing decimal point. Write all rows in the same unit",
             )

@@ -1,6 +1,6 @@
-"""Corners of points, where the direction changes abruptly at any scale, and their blends; and gaps between points.
+"""Corners, at which the direction of points changes abruptly at any scale, their blends, and gaps between points.
 
-Long straight sections between points get additional points, which keep a fitted curve straight.
+Long straight sections between points get additional points, so that a fitted curve is straight there.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from brachis.task.points.fit import lengths_along
 from brachis.task.points.points import Array, Indices, Points
 
 LEAST_ANGLE = np.deg2rad(12.0)
-"""Smallest angle of a corner, rad. Smaller changes of direction are left to the fit."""
+"""Minimum change of direction at a corner, rad. Smaller changes are left to the fit."""
 _SURE = 5.0
-"""Largest assumed change of compared angles by scatter, standard deviations; none of 50,000 points exceeds it."""
+"""Largest change of compared angles attributed to scatter, in standard deviations; none of 50,000 points exceeds it."""
 _STRAIGHT = 0.7
-"""Least straightness of lines whose directions are compared. An arc of 200 degrees, which seems to turn by 160 degrees
-in the opposite direction, has less."""
+"""Minimum straightness of lines whose directions are compared. An arc of 200 degrees, which seems to turn by 160
+degrees in the opposite direction, is less straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Corner:
     angle : float
         Change of direction, rad.
     place : (p,) ndarray
-        Position at which the straight lines before and after meet, m.
+        Position at which the straight lines before and after the corner meet, m.
     """
 
     index: int
@@ -51,7 +51,7 @@ class Corner:
 def find_corners(
     points: Points, scatter: Scatter, tolerance: float
 ) -> tuple[Corner, ...]:
-    """Return the corners in order.
+    """Return the corners of points, in order.
 
     Parameters
     ----------
@@ -59,13 +59,13 @@ def find_corners(
     scatter : Scatter
         Scatter of the points.
     tolerance : float
-        Corners rounded within this distance still count as corners, m.
+        Corners that are rounded within this distance still count as corners, m.
     """
     if len(points) < 3 or points.dimension < 2:
         return ()
     u = lengths_along(points.position, scatter.deviation)
     spacing = u[-1] / (len(points) - 1)
-    direction = 0.02  # rad: largest change of a direction by scatter
+    direction = 0.02  # rad: largest change of a direction due to scatter
     for_direction = 12.0 * spacing * (scatter.deviation / direction) ** 2
     near = for_direction ** (1.0 / 3.0)
     width = max(near, 2.0 * tolerance)
@@ -73,13 +73,13 @@ def find_corners(
     near_turn = _turning(points.position, u, width, least)
     wide_turn = _turning(points.position, u, 2.0 * width, 2 * least)
     angle = near_turn.angle
-    # Between lines farther apart, a smooth curve turns by proportionally more, and a corner by the same angle.
+    # Between lines that are farther apart, a smooth curve turns proportionally more, but a corner by the same angle.
     growth = wide_turn.distance / near_turn.distance
     share = (2.0 + growth) / 3.0
     doubt = _SURE * scatter.deviation * near_turn.uncertainty
     sharp = (wide_turn.angle > 0.0) & (wide_turn.angle < share * (angle - doubt))
     sharp &= wide_turn.straightness > _STRAIGHT
-    # Points that turn by this much from one side to the next do not lie on a smooth curve.
+    # Points whose direction changes this much from one side to the next are not on a smooth curve.
     sides = _turning(points.position, u, 0.0, 1)
     doubt = 8.0 * scatter.deviation * sides.uncertainty
     sharp |= sides.angle - doubt > np.deg2rad(50.0)
@@ -87,7 +87,7 @@ def find_corners(
     fine = _turning(points.position, u, near, least)
     sharp &= np.minimum(angle, fine.angle) > np.maximum(LEAST_ANGLE, angle / 4.0)
     peaks = _peaks(angle, sharp, u, width, least)
-    # Lines longer than scatter requires would miss the corner if the path bends.
+    # If the path bends, lines longer than scatter requires would miss the corner.
     return tuple(
         _locate(points, u, i, float(angle[i]), near, least, tolerance / 4.0)
         for i in peaks
@@ -96,7 +96,7 @@ def find_corners(
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
-    """The turning at every point, from straight lines fitted to the points before and after it; arrays (n,).
+    """Turning (change of direction) at each point, from lines fitted to the points before and after it; arrays (n,).
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class _Turning:
     distance : ndarray
         Distance between the middles of the two lines along the path, m.
     straightness : ndarray
-        Ratio of the length of a line to that of the path, the lower of the two; 1 if the points are on the lines.
+        The lower of the two ratios of the length of a line to that of the path; 1 if the points are on the lines.
     """
 
     angle: Array
@@ -117,7 +117,7 @@ class _Turning:
 
 
 def _turning(position: Array, u: Array, width: float, least: int) -> _Turning:
-    """Return the turning at places u, m, between lines through the points within `width`, m, or `least` points."""
+    """Return the turning at places u, m, between lines fitted to `width`, m, or to at least `least` points."""
     index = np.arange(len(u))
     last = len(u) - 1
     begins = np.minimum(np.searchsorted(u, u - width), index - least)
@@ -138,7 +138,7 @@ def _turning(position: Array, u: Array, width: float, least: int) -> _Turning:
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Straight lines fitted to points: unit vectors, (n, p), and numbers, (n,), as in `_Turning`."""
+    """Straight lines fitted to points: unit vectors, (n, p), and quantities, (n,), as in `_Turning`."""
 
     direction: Array
     uncertainty: Array
@@ -167,7 +167,7 @@ def _lines(position: Array, u: Array, first: Indices, last: Indices) -> _Lines:
 def _peaks(
     angle: Array, sharp: np.ndarray, u: Array, width: float, least: int
 ) -> list[int]:
-    """Return the index of the largest angle in every run of sharp angles as wide as the fitted lines."""
+    """Return the index of the largest angle in each run of sharp angles that is as wide as the fitted lines."""
     peaks: list[int] = []
     for i in np.flatnonzero(sharp).tolist():
         near = bool(peaks) and (u[i] - u[peaks[-1]] < width or i - peaks[-1] < least)
@@ -183,8 +183,7 @@ def _locate(
 ) -> Corner:
     """Return the corner near a point: the point itself, or where the lines before and after it come closest.
 
-    It is the point itself if nothing scatters and both the points before and the points after lead to within `off`, m,
-    of it.
+    The corner is the point itself if there is no scatter and the points on both sides lead to within `off`, m, of it.
     """
     position = points.position
     here = Corner(i, i, i + 1, angle, position[i])
@@ -208,7 +207,7 @@ def _locate(
         np.stack([a, -b], axis=1), centre_after - centre_before, rcond=None
     )
     place = (centre_before + steps[0] * a + centre_after + steps[1] * b) / 2.0
-    gap = u[i + 1] - u[i - 1]  # a corner is not at an end
+    gap = u[i + 1] - u[i - 1]  # an end of the path is not a corner
     after = float((position[i] - place) @ (a + b)) > 0.0
     far = np.linalg.norm(place - position[i]) > max(width, gap)
     if far or (least == 1 and after != from_after):
@@ -219,7 +218,7 @@ def _locate(
 def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool:
     """Return whether the cubic through four points on one side, or a lower degree through fewer, leads to a point.
 
-    It may miss the point by `off`, m, or by a small fraction of the spacing.
+    The cubic may miss the point by `off`, m, or by a small fraction of the spacing.
     """
     from scipy.interpolate import krogh_interpolate
 
@@ -233,7 +232,7 @@ def _continues(position: Array, u: Array, i: int, sign: int, off: float) -> bool
 
 
 def fill_gaps(points: Points) -> Points:
-    """Add points on straight sections that are five times longer than usual, and note the number of these sections."""
+    """Add points on straight sections five times as long as usual, and note the number of these sections."""
     chords = points.steps
     usual = float(np.median(chords))
     times = 5.0
@@ -248,18 +247,19 @@ def fill_gaps(points: Points) -> Points:
     if points.has_quaternions:
         turning = with_like_signs(turning)
     gaps = write_count(int(np.count_nonzero(long)), "gap")
-    note = f"taken as straight: {gaps} longer than {times:g} times the usual spacing"
+    note = f"treated as straight: {gaps} longer than {times:g} times the usual spacing"
     rows = points.only(np.ceil(at).astype(int))
     notes = (*points.notes, note)
     return replace(rows, position=position, turning=turning, notes=notes)
 
 
 def blend_size(angle: float, distance: float, shortest: float) -> float:
-    """Return the length that a blend takes from either side, m, to pass a corner of straight lines at a distance, m.
+    """Return the length that a blend must cut from either side to pass a corner of straight lines at a distance, m.
 
-    With `size` from either side and unit tangents a, b the ends lie at -size a and size b of the corner, and the
-    blend's parameter has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`. Its middle is
-    ``(b - a) (size / 2 - 11/64 length)`` away, and ``|b - a| = 2 sin(angle / 2)``.
+    With `size` cut from each side and unit tangents a, b, the ends of the blend are at -size a and size b relative to
+    the corner, and the parameter of the blend has the length ``size (1 + cos(angle / 2))``, see `brachis.path.joins`.
+    The middle of the blend is ``(b - a) (size / 2 - 11/64 length)`` away from the corner, and ``|b - a| = 2 sin(angle /
+    2)``.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def blend_size(angle: float, distance: float, shortest: float) -> float:
         Change of direction, rad.
     distance : float
     shortest : float
-        Length of the shorter neighbouring curve, m.
+        Length of the shorter of the two neighbouring curves, m.
     """
     of_size = 2.0 * sin(angle / 2.0) * (0.5 - 11.0 / 64.0 * (1.0 + cos(angle / 2.0)))
     return min(distance / of_size, 0.45 * shortest)

@@ -1,4 +1,4 @@
-"""From points to curves: checks, corners, fits between successive corners with their speeds, and a report."""
+"""From points to curves: checks, corners, fits between successive corners, speeds along the fits, and a report."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 Run = tuple[tuple[float, float], ...]
-"""A table (sigma, speed), m and m/s, linear in between."""
+"""A table of pairs (sigma, speed), m and m/s, interpolated linearly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,12 @@ class FittedCurve:
     points : Points
         The points, with the corners as first and last point.
     fit : Fit
-        The fit, with errors at the user's points only, without the corners.
+        The fit, with errors only at the user's points, without the corners.
     speeds : tuple of Run
         Tables of the speeds prescribed along the curve.
     blend : float or None
-        Length that the blend at its end takes from it and from the next curve, m; None for the last curve.
+        Length that the blend at the end of the curve cuts from this and from the next curve, m; None for the last
+        curve.
     """
 
     points: Points
@@ -57,12 +58,12 @@ class FittedCurve:
 
     @property
     def spline(self) -> BSpline:
-        """Position, m, and turning as in `Points`, over roughly the arc length, m."""
+        """Spline of the position, m, and turning (see `Points`) over a parameter close to the arc length, m."""
         return self.fit.spline
 
     @property
     def length(self) -> float:
-        """Range of sigma, roughly the arc length, m."""
+        """Range of sigma, which is close to the arc length, m."""
         return float(self.fit.breaks[-1])
 
 
@@ -103,12 +104,12 @@ def _fit_between(
 def _blend_between(
     first: FittedCurve, second: FittedCurve, corner: Corner, tolerance: FitTolerance
 ) -> float:
-    """Return the size of the blend that keeps all points near a corner within the tolerance, m.
+    """Return the size of the blend that keeps all points close to a corner within the tolerance, m.
 
     Raises
     ------
     TaskError
-        The points leave no room.
+        The points leave no room for a blend.
     """
     shortest = min(first.length, second.length)
     widest = blend_size(corner.angle, tolerance.at_corners, shortest)
@@ -133,7 +134,7 @@ def _blend_between(
 def _fit_one(
     points: Points, tolerance: FitTolerance, scatter: Scatter, note: str | None
 ) -> Fit:
-    """Fit one curve.
+    """Fit one curve to points.
 
     Raises
     ------
@@ -168,15 +169,15 @@ def _fit_one(
 
 
 def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
-    """Return tables (sigma, speed), m and m/s, linear in between, of the sections with a prescribed speed.
+    """Return a table (sigma, speed), m and m/s, interpolated linearly, for each section with a prescribed speed.
 
-    The speed of a point applies on the way to it. The table has the lower of the speeds before and after each point, so
-    that it nowhere exceeds a prescribed speed. Rows that linear interpolation gives are left out.
+    The speed of a point applies on the way to this point. The table contains the lower of the speeds before and after
+    each point, so that it nowhere exceeds a prescribed speed. Rows that follow from linear interpolation are left out.
 
     Parameters
     ----------
     sigma : (n,) ndarray
-        Places of the points.
+        Places of the points on the curve, m.
     speed : (n,) ndarray or None
         Speeds on the way to the points, m/s; NaN where none is prescribed.
     """
@@ -185,7 +186,7 @@ def speed_runs(sigma: Array, speed: Array | None) -> tuple[Run, ...]:
     sigma = np.maximum.accumulate(sigma)
     step_speeds = speed[1:]
     runs = []
-    # The function returns slices, in order, which the stubs do not say.
+    # The function returns slices in order, although the stubs do not state this.
     for run in np.ma.clump_unmasked(np.ma.masked_invalid(step_speeds)):  # type: ignore[no-untyped-call]
         speeds = step_speeds[run]
         values = np.minimum(np.append(speeds[0], speeds), np.append(speeds, speeds[-1]))
@@ -211,7 +212,7 @@ def fit_curves(
     points : Points
     tolerance : FitTolerance
     stops : bool, optional
-        Whether the tool stops at corners, which are otherwise rounded.
+        Whether the tool stops at corners. Otherwise corners are rounded.
 
     Raises
     ------
@@ -229,7 +230,7 @@ def fit_curves(
         if degrees > 150.0:
             raise points.wrong(
                 corner.index,
-                f"the path turns back, by {degrees:.4g} degrees",
+                f"the path turns back by {degrees:.4g} degrees",
                 allowed="corners up to 150 degrees",
                 hint="Set corner: stop if the tool stops there",
             )
@@ -270,13 +271,13 @@ def fit_curves(
 def _report_corner(
     points: Points, corner: Corner, distance: float, blend: float
 ) -> FoundCorner:
-    """Return the report of a corner at a distance along the path, m, with its blend, m."""
+    """Return the report on a corner at a given distance along the path, m, with the length of its blend, m."""
     row = int(points.rows[corner.index])
     return FoundCorner(row=row, angle=corner.angle, distance=distance, blend=blend)
 
 
 def _profile(*columns: Array) -> tuple[Any, ...]:
-    """Return the largest values of columns in successive groups of rows, at most 400 groups."""
+    """Return the largest value of each column in successive groups of rows; there are at most 400 groups."""
     count = len(columns[0])
     starts = np.linspace(0, count, min(count, 400), endpoint=False).astype(int)
     largest = [np.maximum.reduceat(values, starts).tolist() for values in columns]
@@ -286,16 +287,16 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
 def cut_at_corners(
     points: Points, *, stops: bool = False
 ) -> tuple[tuple[Points, ...], FitReport]:
-    """Return the sections of points through which one curve each passes, and their report.
+    """Return the sections of points, each for one curve through its points, and a report.
 
-    Points are refused if the curvature of these curves would mainly come from scatter.
+    Points are refused if the curvature of the curves would be mainly due to scatter.
 
     Parameters
     ----------
     points : Points
     stops : bool, optional
-        Whether the tool stops at corners, which are then the first and last points of sections. Otherwise all points
-        form one section.
+        Whether the tool stops at corners; sections then begin and end at corners. Otherwise all points form one
+        section.
 
     Raises
     ------
@@ -307,10 +308,10 @@ def cut_at_corners(
     refuse_spikes(points, scatter, 0.0)
     distances = sum_up(points.steps).tolist()
     length = distances[-1]
-    largest = 0.5  # of the curvature that scatter makes times the length
+    largest = 0.5  # of the product of length and curvature due to scatter
     if scatter.curvature * length > largest:
         raise TaskError(
-            "the points are too rough for a curve through all of them: its curvature would be noise",
+            "the points are too rough for a curve through all of them: the curvature would be noise",
             found=f"{scatter}, which alone give a curvature of {scatter.curvature:.2g} 1/m",
             allowed=f"less than {largest / length:.2g} 1/m",
             where=points.source,

@@ -1,13 +1,13 @@
 """A smooth curve within a tolerance of points, with few knots.
 
-The curve is a quintic B-spline (C4) through the first and the last point, over roughly the arc length. Of all such
-curves with the same knots, it has the least sum of squared distances. Intervals in which the tolerance is exceeded are
-halved; then unnecessary knots are removed.
+The curve is a quintic B-spline (C4) through the first and the last point, over roughly the arc length. Among all such
+curves with the same knots, it has the least sum of squared distances from the points. Intervals in which the tolerance
+is exceeded are halved. Then unnecessary knots are removed.
 
-The place of a point along the curve follows from the points alone, and is then corrected by no more than a few
-tolerances. So a path may wind, cross itself, or be repeated: no point is assigned to a different turn, neither by a
-first rough curve nor in the reported distances. These are distances to places on the curve in the order of the points,
-so they are never too small.
+The place of a point along the curve follows from the points alone, and is then corrected by at most a few tolerances. A
+path may therefore wind, cross itself, or be repeated: no point is assigned to a different turn, either by a first rough
+curve or in the reported distances. The distances are measured to places on the curve in the order of the points, so
+they are never too small.
 """
 
 from __future__ import annotations
@@ -34,16 +34,19 @@ if TYPE_CHECKING:
 DEGREE = 5
 """Degree of all fitted curves, which are C4 at their knots."""
 _NOISY_POINTS = 10
-"""Minimum number of points in an interval if points scatter: with fewer, a curve would follow the scatter."""
+"""Minimum number of points in an interval if the points scatter. With fewer points, a curve would follow the
+scatter."""
 _AIM = 0.9
-"""Fraction of the tolerance that a curve uses at points without scatter, because it is farther away between them.
-With 1 the curves of 60 winding paths were up to 1.38 tolerances off there, with 0.9 up to 1.06, for 2 % more knots."""
+"""Fraction of the tolerance that a curve may use at points without scatter, because its error is larger between points.
+With 1, the curves of 60 winding paths were up to 1.38 tolerances off between points; with 0.9, up to 1.06, for 2 % more
+knots."""
 _MANY = 15_000
-"""Number of points from which knots are found: 50,000 points of a raster took 9 s. Twenty turns of a helix need 2,000.
+"""Maximum number of points from which knots are chosen: 50,000 points of a raster took 9 s. Twenty turns of a helix
+need 2,000 points.
 """
 _REACH = 3.0
-"""Largest distance, in tolerances, of a place on the curve from the length along the points: more than the error of
-these lengths, and less than the distance to another turn."""
+"""Maximum difference, in tolerances, between a place on the curve and the length along the points: more than the error
+of these lengths, but less than the distance to another turn."""
 _SMALL = 0.3
 """Fraction of the tolerance up to which scatter counts as small."""
 
@@ -55,15 +58,15 @@ class Fit:
     Attributes
     ----------
     spline : BSpline
-        Position and turning over sigma, which starts at 0 and is roughly the arc length, m.
+        Position and turning over sigma, which starts at 0 and is close to the arc length, m.
     breaks : (N + 1,) ndarray
-        Its knots, each listed once.
+        Knots of the spline, each listed once.
     sigma : (n,) ndarray
-        The nearest place on the curve for every point.
+        Place on the curve that is nearest to each point.
     position_errors : (n,) ndarray
         Distances of the points from these places, m.
     turning_errors : (n,) ndarray
-        Angles between the orientations there, rad.
+        Angles between given and fitted orientations there, rad.
     """
 
     spline: BSpline
@@ -73,12 +76,12 @@ class Fit:
     turning_errors: Array
 
     def ratios(self, tolerance: FitTolerance) -> Array:
-        """Return the errors relative to the tolerance, (n,), the larger of both kinds at every point."""
+        """Return the errors relative to their tolerances, (n,): the larger of the two kinds of error at each point."""
         turning = self.turning_errors / tolerance.orientation
         return np.maximum(self.position_errors / tolerance.position, turning)
 
     def only(self, rows: slice) -> Fit:
-        """Return the fit with the errors of some of the points."""
+        """Return the same fit, with errors only at some of the points."""
         return replace(
             self,
             sigma=self.sigma[rows],
@@ -87,7 +90,7 @@ class Fit:
         )
 
     def over_length(self, dimension: int) -> Fit:
-        """Return the fit over a sigma that ends at the length of the curve, of so many position rows."""
+        """Return the fit with sigma rescaled to end at the length of the curve; `dimension` counts position rows."""
         from scipy.integrate import simpson
         from scipy.interpolate import BSpline
 
@@ -102,11 +105,11 @@ class Fit:
         )
 
     def worst(self, tolerance: FitTolerance) -> float:
-        """Return the largest of `ratios`."""
+        """Return the largest error relative to its tolerance; see `ratios`."""
         return float(self.ratios(tolerance).max())
 
     def worst_between_knots(self, tolerance: FitTolerance) -> Array:
-        """Return the largest of `ratios` in every interval, (N,)."""
+        """Return the largest of the `ratios` in each interval, (N,)."""
         worst = np.zeros(len(self.breaks) - 1)
         interval = np.searchsorted(self.breaks[1:-1], self.sigma, side="right")
         np.maximum.at(worst, interval, self.ratios(tolerance))
@@ -130,7 +133,7 @@ class _Fitter:
     tolerance: FitTolerance
 
     def fit(self, breaks: Array) -> Fit:
-        """Return the least-squares spline with these knots, (N + 1,), through both ends.
+        """Return the least-squares spline with these knots, (N + 1,), through the first and the last point.
 
         Every interval must contain a point, and there must be at least N + 5 points.
         """
@@ -149,7 +152,7 @@ class _Fitter:
         return self.measure(BSpline(knots * length, control_points, DEGREE))
 
     def interpolate(self) -> Fit:
-        """Return the spline through all points; through few points it is a polynomial without inner knots."""
+        """Return the spline through all points; through a few points it is a polynomial without inner knots."""
         from scipy.interpolate import make_interp_spline
 
         degree = min(len(self.points) - 1, DEGREE)
@@ -160,7 +163,7 @@ class _Fitter:
         return self.measure(spline)
 
     def measure(self, spline: BSpline) -> Fit:
-        """Return the fit with the places on the curve, close to `lengths`, that are nearest to the points.
+        """Return the fit with the places on the curve nearest to the points, searched for close to `lengths`.
 
         Distances and angles are weighted by their tolerances, because angles locate scattered points better.
         """
@@ -187,10 +190,10 @@ class _Fitter:
 
 
 def lengths_along(position: Array, deviation: float) -> Array:
-    """Return the length along the path at each of n positions, (n, p), m; strictly ascending from zero.
+    """Return the length along the path at each of n positions, (n, p), m, strictly ascending from zero.
 
-    If the points scatter, it is the length of the polygon through the means of blocks of points. The blocks are so long
-    that the scatter of the means is small in comparison.
+    If the points scatter, this is the length of the polygon through the means of blocks of points. The blocks are long
+    compared with the scatter of the means.
     """
     count = len(position)
     block = _block(position, deviation)
@@ -209,7 +212,7 @@ def lengths_along(position: Array, deviation: float) -> Array:
 
 
 def _arcs(position: Array) -> Array:
-    """Return the lengths of arcs between n positions, (n - 1,), m, from circles through three successive positions."""
+    """Return the arc lengths between n positions, (n - 1,), m, from circles through three successive positions."""
     chords = np.maximum(steps_of(position), 1e-9)
     directions = np.diff(position, axis=0) / chords[:, None]
     sine = steps_of(directions) * np.linalg.norm(
@@ -223,7 +226,7 @@ def _arcs(position: Array) -> Array:
 
 
 def _block(position: Array, deviation: float) -> int:
-    """Return the number of points to average, doubled until the blocks are far apart compared with the scatter."""
+    """Return the number of points to average, doubled until blocks are far apart compared with the scatter."""
     count = len(position)
     block = 1
     while deviation > 0.0 and 8 * block < count:
@@ -237,7 +240,7 @@ def _block(position: Array, deviation: float) -> int:
 def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit:
     """Return a curve with few knots within the tolerance of points, or the closest curve if there is none.
 
-    If there are many points, knots are first found for some of them, and then added for all of them if needed.
+    If there are many points, knots are first chosen for some of the points, and then added for all points if needed.
 
     Parameters
     ----------
@@ -273,14 +276,14 @@ def fit_points(points: Points, tolerance: FitTolerance, scatter: Scatter) -> Fit
 
 
 def _scale(tolerance: FitTolerance, share: float) -> FitTolerance:
-    """Return the tolerance with a fraction of its tolerance of positions."""
+    """Return the tolerance with its position tolerance reduced to a fraction."""
     return tolerance.model_copy(update={"position": share * tolerance.position})
 
 
 def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
-    """Return the minimum numbers of points per interval, in the order in which they are tried.
+    """Return the minimum numbers of points per interval to try, in order.
 
-    If scatter is small compared with the tolerance, the curve may follow it where the path bends.
+    If the scatter is small compared with the tolerance, the curve may follow it where the path bends.
     """
     if not scatter.noisy(tolerance):
         return (1,)
@@ -292,9 +295,10 @@ def _least_points(tolerance: FitTolerance, scatter: Scatter) -> tuple[int, ...]:
 
 
 def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
-    """Halve the intervals in which the tolerance is exceeded, from `breaks` on, until it is met or none can be halved.
+    """Halve intervals, starting from `breaks`, until the tolerance is met or no interval can be halved.
 
-    No interval gets fewer points than `least`. If an interval has too few points to be halved, its neighbours are.
+    No interval gets fewer points than `least`. If an interval has too few points to be halved, its neighbours are
+    halved.
     """
     lengths = fitter.lengths
     while True:
@@ -309,7 +313,7 @@ def _add_knots(fitter: _Fitter, breaks: Array, least: int) -> Fit:
         if not halved.any() or count + DEGREE > len(lengths):
             return fit
         middles = (breaks[1:] + breaks[:-1]) / 2.0
-        # In the middle, or as close to it as possible with enough points on both sides.
+        # Halve in the middle, or as close to it as possible with enough points on both sides.
         seconds = np.searchsorted(lengths, middles).clip(
             firsts[:-1] + least, firsts[1:] - least
         )
@@ -328,7 +332,7 @@ def _remove_knots(fitter: _Fitter, fit: Fit) -> Fit:
         worst = fit.worst_between_knots(fitter.tolerance)
         beside = np.maximum(worst[:-1], worst[1:])
         beside[np.isin(fit.breaks[1:-1], needed)] = np.inf
-        # Never two neighbours at once: of every pair the one with more of the tolerance to spare.
+        # Never remove two neighbours at once, but only the one with more tolerance to spare.
         around = np.pad(beside, 1, constant_values=np.inf)
         chosen = (beside < 1.0) & (beside <= around[:-2]) & (beside < around[2:])
         removed = fit.breaks[1:-1][chosen]

@@ -1,9 +1,9 @@
 """G-code: rapid and straight moves, arcs and feed rates (G0, G1, G2, G3, F) in any plane, absolute or incremental.
 
 Moves are replaced by points on them, with arcs accurate to a micrometre. Codes that do not affect the path of the tool
-tip (spindle, coolant, tool length, one work offset) are skipped and reported. Codes that would affect it (cycles,
-cutter compensation, rotary axes, subprograms, changes of the work offset) are refused, and so are letters that may
-change the path. M2 and M30 end the program.
+tip (spindle, coolant, tool length, one work offset) are skipped and reported. Codes that would affect this path
+(cycles, cutter compensation, rotary axes, subprograms, changes of the work offset) are refused, as are letters that may
+change it. M2 and M30 end the program.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SUFFIXES: Final = (".nc", ".ngc", ".gcode", ".tap")
 _WORD = re.compile(
     r"((?<![0-9.])E|[A-DF-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?![0-9.]*E[0-9.+-])"
 )
-"""A letter and its number, without exponent: an E directly after a number is not a word."""
+"""A letter and a number without exponent; an E directly after a number is not a word."""
 _COMMENT = re.compile(r"\([^)]*\)|;.*$|%")
 _MODES: Final = {
     **{f"G{number}": ("motion", f"G{number}") for number in range(4)},
@@ -38,36 +38,36 @@ _MODES: Final = {
     "G90.1": ("absolute_centres", True),
     "G91.1": ("absolute_centres", False),
 }
-"""Settings made by codes. For a plane: the two axes of its arcs, then the axis along its normal."""
+"""Settings made by codes. The setting of a plane contains the two axes of its arcs, then the axis along its normal."""
 _UNITS: Final = {"G20": 0.0254, "G21": 1e-3}
 _IGNORED: Final = {"G8", "G15", "G40", "G43", "G49", "G61", "G64", "G69", "G80", "G94"}
 _OFFSET_CHANGES: Final = (
     "the work offset changes within the program, so the position of the tool is unknown"
 )
 _REFUSED: Final = {
-    "G4": "a dwell is not read: cut the file there and set dwell on the segment",
-    "G7": "X would be a diameter: write radii (G8)",
-    **dict.fromkeys(("G28", "G30"), "the machine's reference position is unknown"),
+    "G4": "a dwell cannot be read: split the file there and set dwell on the segment",
+    "G7": "X would be a diameter; write radii (G8)",
+    **dict.fromkeys(("G28", "G30"), "the reference position of the machine is unknown"),
     **dict.fromkeys(
         ("G73", "G76", *(f"G{number}" for number in range(81, 90))),
-        "canned cycles are not read",
+        "canned cycles cannot be read",
     ),
-    **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not read"),
+    **dict.fromkeys(("M97", "M98", "M99"), "subprograms cannot be read"),
 }
-"""Codes after which this reader would not know the position of the tool, with the reason."""
+"""Codes after which the position of the tool would be unknown to this reader, with the reason."""
 _OFFSETS: Final = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _PIECES = 4
 """Minimum number of points on a move."""
 _ROUND = 2e-3
-"""Largest difference of the radii at the start and end of an arc, as a fraction of the radius."""
+"""Maximum difference of the radii at the start and end of an arc, as a fraction of the radius."""
 
 _MOST_TURNS: Final = 1_000
-"""Largest number of turns of one arc; with a radius of 1 m its points take 53 MB."""
+"""Maximum number of turns of one arc. With a radius of 1 m the points of such an arc take 53 MB."""
 
 
 @dataclass
 class _Machine:
-    """State after the words read so far; `at` has NaN for an axis that has not been stated yet.
+    """State after the words read so far; `at` is NaN for axes whose position has not been stated yet.
 
     `moves` contains the points on every move, (k, 3), with its speed and line.
     """
@@ -96,21 +96,21 @@ class _Machine:
 
 
 def read_gcode(text: str, rows: Rows, source: str) -> Points:
-    """Return the points of a program, with notes on skipped codes.
+    """Return the points of a program and notes on skipped codes.
 
     Parameters
     ----------
     text : str
         The program.
     rows : tuple of str or str
-        Rows of the task space, or its name if it is one of poses; the program gives the position.
+        Rows of the task space, or its name if it is a task space of poses; the program states the position.
     source : str
         The file, for messages.
 
     Raises
     ------
     TaskError
-        The program has words that are not understood, or an invalid arc; the message names the line.
+        The program contains unknown words or an invalid arc; the message names the line.
     """
     has_rows = isinstance(rows, tuple)
     names = tuple(row for row in rows if row != "axis") if has_rows else POSITION
@@ -136,7 +136,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
             found=write_count(sum(counts), "point"),
             allowed="2 or more",
             where=source,
-            hint=f"{missing} is never stated" if missing else None,
+            hint=f"the program never states {missing}" if missing else None,
         )
     chosen = [POSITION.index(name) for name in names]
     moves, speeds, lines = zip(*machine.moves, strict=True)
@@ -145,7 +145,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
     notes = ["G-code"]
     if not machine.unit_stated:
         notes.append(
-            "lengths are in millimetres, because the program has neither G20 nor G21"
+            "lengths are read as millimetres, because the program contains neither G20 nor G21"
         )
     if machine.skipped:
         notes.append(f"skipped {', '.join(sorted(machine.skipped))}")
@@ -160,7 +160,7 @@ def read_gcode(text: str, rows: Rows, source: str) -> Points:
 
 
 def _obey(machine: _Machine, code: str) -> None:
-    """Execute one line without its comments."""
+    """Execute one line, from which comments have been removed."""
     values, codes = _read_words(machine, code)
     for mode in codes:
         _set_mode(machine, mode)
@@ -197,7 +197,7 @@ def _read_words(machine: _Machine, code: str) -> tuple[dict[str, float], list[st
             codes.append(f"{letter}{float(text):g}")
         elif letter in "ABCUVW":
             raise machine.wrong(
-                "axes other than X, Y, Z are not read",
+                "axes other than X, Y, Z cannot be read",
                 letter + text,
                 "X, Y, Z, I, J, K, R, F",
             )
@@ -229,9 +229,9 @@ def _set_mode(machine: _Machine, code: str) -> None:
             machine.offset = code
         machine.ended |= code in {"M2", "M30"}
         machine.skipped.add(code)
-    elif code != "G92":  # it is executed with the coordinates of its line
+    elif code != "G92":  # executed later, with the coordinates of its line
         raise machine.wrong(
-            "this code is not read",
+            "this code cannot be read",
             code,
             "G0 to G3, G17 to G21, G40, G43, G49, G54 to G59, G61, G64, G80, G90 to G92, G94",
         )
@@ -245,7 +245,7 @@ def _move(
     Raises
     ------
     TaskError
-        There is no motion code, a letter may change the path in an unknown way, or the position is unknown.
+        There is no motion code, a letter might change the path in an unknown way, or the position is unknown.
     """
     if motion is None:
         raise machine.wrong(
@@ -256,7 +256,7 @@ def _move(
         understood |= {"P", "R", *("IJK"[axis] for axis in machine.plane[:2])}
     for letter in sorted(set(values) - understood):
         raise machine.wrong(
-            f"the letter {letter} of this {motion} is not read, and may change the path",
+            f"the letter {letter} of this {motion} cannot be read, but may change the path",
             f"{letter}{values[letter]:g}",
             ", ".join(sorted(understood)),
         )
@@ -269,7 +269,7 @@ def _move(
                     f"{axis} is incremental (G91), but the position before this move is unknown",
                     f"{axis}{values[axis]:g}",
                     "an absolute position before G91",
-                    "Begin with G90 G0 and the position of the tool; with relative: true any position will do",
+                    "Begin with G90 G0 and the position of the tool; with relative: true any position is possible",
                 )
             base = 0.0 if absolute else start[i]
             end[i] = base + values[axis] * machine.unit
@@ -289,14 +289,14 @@ def _move(
 
 
 def _shares(count: int) -> Array:
-    """Return fractions of a move, (count, 1), evenly spaced up to 1."""
+    """Return evenly spaced fractions of a move up to 1, (count, 1)."""
     return (np.arange(1, count + 1) / max(count, 1))[:, None]
 
 
 def _arc(
     machine: _Machine, start: Array, end: Array, values: dict[str, float]
 ) -> Array:
-    """Return points on an arc, (k, 3); in its plane, points are complex numbers."""
+    """Return points on an arc, (k, 3). Within the plane of the arc, points are computed as complex numbers."""
     *plane, normal = machine.plane
     begin = complex(*start[plane])
     finish = complex(*end[plane])
@@ -317,7 +317,7 @@ def _arc(
     turn = -2.0 * pi if machine.motion == "G2" else 2.0 * pi
     swept = (
         phase(finish - centre) - phase(begin - centre)
-    ) % turn  # with the sign of turn
+    ) % turn  # with the same sign as turn
     if min(abs(swept), abs(swept - turn)) < 1e-9:
         swept = turn
     turns = values.get("P", 1.0)
@@ -341,7 +341,7 @@ def _arc(
 def _centre(
     machine: _Machine, begin: complex, finish: complex, radius: float
 ) -> complex:
-    """Return the centre of an arc of given radius; a negative radius means more than half a turn."""
+    """Return the centre of an arc of given radius; a negative radius means that the arc is longer than half a turn."""
     chord = finish - begin
     length = abs(chord)
     if not length or length > 2.0 * abs(radius) * (1.0 + _ROUND):

@@ -1,4 +1,4 @@
-"""Points of a path in SI units, made from arrays and transforms, with their names for messages."""
+"""Points of a path in SI units, made from arrays and transforms, with names of their rows for messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 Rows = tuple[str, ...] | str
-"""Rows of the task space, or its name if it is one of poses."""
+"""Rows of the task space, or its name if it is a task space of poses."""
 QUATERNION = 4
 
 
@@ -31,13 +31,14 @@ class Points:
     position : (n, p) ndarray
         Positions, m.
     turning : (n, q) ndarray
-        Unit quaternions w, x, y, z with signs that make neighbours close (q = 4), yaw in rad (q = 1), or none (q = 0).
+        Unit quaternions w, x, y, z, with signs chosen so that neighbours are close (q = 4); yaw, rad (q = 1); or
+        nothing (q = 0).
     speed : (n,) ndarray or None
         Speed of the tool on the way to each point, m/s; NaN where it is not prescribed.
     rows : (n,) int ndarray
-        Lines of a file, or indices of an array.
+        Line of each point in a file, or its index in an array.
     source : str
-        File or argument, for messages.
+        File or argument that contains the points, for messages.
     row : str
         Word for an entry of `rows`: ``line`` or ``row``.
     notes : tuple of str
@@ -68,7 +69,7 @@ class Points:
 
     @property
     def columns(self) -> Array:
-        """Position and turning side by side, (n, p + q)."""
+        """Position and turning as columns of one array, (n, p + q)."""
         return np.hstack([self.position, self.turning])
 
     @property
@@ -77,7 +78,7 @@ class Points:
         return steps_of(self.position)
 
     def only(self, chosen: Any) -> Points:
-        """Return the chosen points."""
+        """Return only the chosen points."""
         return replace(
             self,
             position=self.position[chosen],
@@ -91,7 +92,7 @@ class Points:
         return f"{self.row} {self.rows[i]}"
 
     def describe(self, i: int) -> str:
-        """Return the row and the position of a point in words."""
+        """Return the row and the position of a point as text."""
         place = ", ".join(f"{value:.6g}" for value in self.position[i])
         return f"{self.name_row(i)}, [{place}] m"
 
@@ -110,10 +111,10 @@ def steps_of(position: Array) -> Array:
 def is_repeated(
     steps: Array, largest: float = tolerances.WRITTEN
 ) -> npt.NDArray[np.bool_]:
-    """Return which of n - 1 steps, m or rad, repeat a point.
+    """Return which of the n - 1 steps, m or rad, count as repetitions of a point.
 
-    They are shorter than rounding, or shorter than both `largest` and a hundredth of the steps before and after. A
-    curve through both points would swing into the direction from one to the other, which is meaningless.
+    Such a step is shorter than rounding errors, or shorter than both `largest` and a hundredth of the steps before and
+    after. A curve through both points would turn into the direction of this step, which is meaningless.
     """
     around = np.pad(steps, 1, mode="reflect")
     shorter = np.minimum(around[:-2], around[2:])
@@ -122,14 +123,14 @@ def is_repeated(
 
 
 def sum_up(steps: npt.ArrayLike) -> Array:
-    """Return the sums, (n,), of the first 0, 1, 2, ... of n - 1 steps."""
+    """Return the cumulative sums of n - 1 steps, (n,), starting with 0."""
     return np.append(0.0, np.cumsum(steps))
 
 
 def project_on_sides(points: Array, begin: Array, side: Array) -> tuple[Array, Array]:
-    """Return the places nearest to points, (n, p), on the sides that start at `begin`, and the distances there, (n,).
+    """Return the places nearest to points, (n, p), on the sides that start at `begin`, and the distances to them, (n,).
 
-    The places are fractions of the sides, (n,).
+    Places are given as fractions of the sides, (n,).
     """
     away = points - begin
     lengths = np.maximum(np.sum(side**2, axis=1), 1e-300)
@@ -157,7 +158,7 @@ def points_from(
     *,
     least: int = 2,
 ) -> Points:
-    """Return points from the arrays or transforms of a program.
+    """Return points from arrays or transforms that a program passes.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def points_from(
     orientations : Rotation, array_like, (n, 3, 3) or (n,), or None
         SciPy rotations, rotation matrices, or yaw angles.
     speed : array_like, (n,), or None
-        Speeds, NaN where none is prescribed.
+        Speeds; NaN where none is prescribed.
     units : FileUnits
         Units of the numbers; m, rad and m/s if not stated.
     source : str
@@ -208,7 +209,7 @@ def points_from(
 
 
 def _matrices(points: Any) -> Any:
-    """Return the homogeneous matrices of transforms; other values are returned unchanged."""
+    """Return the homogeneous matrices of transforms, or any other values unchanged."""
     if isinstance(points, list | tuple) and points:
         if all(hasattr(transform, "homogeneous") for transform in points):
             return [transform.homogeneous for transform in points]
@@ -218,7 +219,7 @@ def _matrices(points: Any) -> Any:
 
 
 def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
-    """Return quaternions, (n, 4), or yaw, (n, 1)."""
+    """Return the orientations as quaternions, (n, 4), or yaw, (n, 1)."""
     from scipy.spatial.transform import Rotation
 
     where = f"{source}: orientations"
@@ -244,7 +245,7 @@ def _turning(orientations: Any, units: FileUnits, source: str) -> Array:
 
 
 def _speeds(speed: Any, units: FileUnits, source: str) -> Array:
-    """Return speeds, (n,), m/s."""
+    """Return the speeds, (n,), in m/s."""
     where = f"{source}: speed"
     speeds = _numbers(speed, where) * SPEEDS[units.speed or "m/s"]
     if speeds.ndim != 1:
@@ -275,7 +276,7 @@ def _numbers(values: Any, where: str) -> Array:
 
 
 def _refuse_first(bad: np.ndarray, problem: str, values: Array, source: str) -> None:
-    """Refuse the first row with a bad value."""
+    """Refuse values that have bad rows; the error names the first bad row."""
     rows = np.flatnonzero(bad.any(axis=tuple(range(1, bad.ndim))))
     if rows.size:
         raise TaskError(

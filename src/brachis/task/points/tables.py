@@ -1,4 +1,4 @@
-"""Tables of numbers as text, with delimiters, decimal commas and byte order marks; and the columns of points.
+"""Tables of numbers as text, with any delimiter, decimal commas or byte order mark; and columns of points.
 
 Columns are named ``x``, ``x_mm``, ``X [mm]``, ``rx (deg)``, ``feed_mm/min``, ... in any order.
 """
@@ -33,20 +33,20 @@ _DELIMITERS: Final = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spac
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Numbers under column names.
+    """A table of numbers with named columns.
 
     Attributes
     ----------
     header : tuple of str
     where : str
-        Place of the header, for messages.
+        Location of the header, for messages.
     body : dict of int to str
-        The other lines, with decimal points, by their numbers counted from 1.
+        The other lines, with decimal points, by line number counted from 1.
     delimiter : str
     source : str
         Name of the file, for messages.
     notes : tuple of str
-        Findings about the form of the file.
+        Findings about the format of the file.
     """
 
     header: tuple[str, ...]
@@ -63,16 +63,16 @@ class Table:
 
     @cached_property
     def values(self) -> Array:
-        """The numbers in the units of the file, (n, c).
+        """The numbers of the table in the units of the file, (n, c).
 
         Raises
         ------
         TaskError
-            A line has the wrong number of values, or a value that is not a finite number; the message names line and
+            A line has the wrong number of values or a value that is not a finite number; the message names line and
             column.
         """
         if not self.body:
-            raise TaskError("the file has no rows of numbers", where=self.source)
+            raise TaskError("the file contains no rows of numbers", where=self.source)
         values = []
         for number, line in self.body.items():
             where = f"{self.source}: line {number}"
@@ -123,7 +123,7 @@ def read_table(text: str, source: str, allowed: str) -> Table:
 
 
 def _with_point(line: str, where: str) -> str:
-    """Replace decimal commas by points; a line with both is refused, because one of them would separate thousands."""
+    """Replace decimal commas by points, and refuse a line with both, because one would separate thousands."""
     if "," in line and "." in line:
         raise TaskError(
             "the line has both decimal points and decimal commas",
@@ -192,7 +192,7 @@ _ORIENTATIONS: Final = {
     ("a", "e", "r"): ("euler_zyz",),
     ("i", "j", "k"): (),
 }
-"""Columns of orientations with their possible conventions, whose numbers are in this order. The tool's axis has no
+"""Columns of orientations and their possible conventions, which have their numbers in this order. The tool axis has no
 convention."""
 _SPEED: Final = "feed"
 _SPEED_NAMES: Final = ("feed", "feedrate", "f", "speed", "v")
@@ -218,24 +218,24 @@ def _choices(rows: Rows) -> tuple[tuple[str, ...], ...]:
 def _read_columns(
     table: Table, rows: Rows, stated: str | None
 ) -> tuple[dict[str, tuple[int, str | None]], tuple[str, ...], str | None]:
-    """Return the meaning of the columns of a table.
+    """Return the meaning of each column of a table.
 
     Parameters
     ----------
     table : Table
     rows : tuple of str or str
-        Rows of the task space, or its name if it is one of poses.
+        Rows of the task space, or its name if it is a task space of poses.
     stated : str, optional
         Convention of the orientations that the task states.
 
     Returns
     -------
     places : dict of str to (int, str or None)
-        Index and unit of every column by its name.
+        Index and unit of each column, by name.
     names : tuple of str
         Names of the columns of positions and orientations.
     convention : str or None
-        Convention of the orientations; None if there are none.
+        Convention of the orientations; None if there are no orientations.
 
     Raises
     ------
@@ -263,7 +263,7 @@ def _read_columns(
 
 
 def _heading(text: str) -> tuple[str, str | None]:
-    """Return name and unit of a heading; a heading that is not understood is returned unchanged."""
+    """Return the name and unit in a column heading, or an unknown heading unchanged."""
     match = _HEADING.match(text.strip().lower())
     if match is None:
         return text, None
@@ -273,7 +273,7 @@ def _heading(text: str) -> tuple[str, str | None]:
 
 
 def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str | None:
-    """Return the convention of the orientations: the only possible one for the columns, or the stated one."""
+    """Return the convention of the orientations: the stated one, or the only one that fits the columns."""
     columns = tuple(name for name in names if name not in POSITION)
     possible = _ORIENTATIONS.get(columns, ())
     if stated is None and len(possible) > 1:
@@ -281,7 +281,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
             f"the columns {', '.join(columns)} do not state the convention of the orientation",
             allowed=f"csv.orientation: {choices(possible)}",
             where=where,
-            hint="State it in the task, csv: {file: ..., orientation: ...}; the wrong one gives a wrong motion",
+            hint="State it in the task, csv: {file: ..., orientation: ...}; a wrong convention gives a wrong motion",
         )
     if stated is not None and stated not in possible:
         usual = [
@@ -305,7 +305,7 @@ def _convention(names: tuple[str, ...], stated: str | None, where: str) -> str |
 def _factor_of(
     name: str, kind: str, unit: str | None, task_unit: str | None, where: str
 ) -> float:
-    """Return the factor from a column's unit to SI units; the unit must not differ from that of the task.
+    """Return the factor from the unit of a column to SI units; the unit must not differ from that in the task.
 
     Raises
     ------
@@ -332,14 +332,14 @@ def _factor_of(
 
 
 def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Points:
-    """Return the points of a table in SI units, with notes on how it was read.
+    """Return the points of a table in SI units, with notes on how the table was read.
 
     Parameters
     ----------
     text : str
         The table.
     rows : tuple of str or str
-        Rows of the task space, or its name if it is one of poses.
+        Rows of the task space, or its name if it is a task space of poses.
     settings : PointFile
         Units and convention of the orientations that the task states.
     source : str
@@ -358,7 +358,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
     notes = [*table.notes]
 
     def read(names: Sequence[str], kind: str) -> Array:
-        """Return the columns of one kind of quantity in SI units."""
+        """Return the columns of one kind of quantity, in SI units."""
         chosen = [places[name] for name in names]
         task_unit = getattr(settings.units, kind)
         usual = task_unit or defaults.get(kind)
@@ -368,7 +368,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
         ]
         stated = dict.fromkeys(unit for _, unit in chosen if unit is not None)
         if stated:
-            notes.append(f"{kind} in {' and '.join(stated)}, as the header says")
+            notes.append(f"{kind} in {' and '.join(stated)}, as stated in the header")
         return table.values[:, [place for place, _ in chosen]] * np.array(factors)
 
     position = [name for name in names if name in POSITION]
@@ -407,7 +407,7 @@ def read_points(text: str, rows: Rows, settings: PointFile, source: str) -> Poin
 
 
 def _check_lengths(points: Points, name: str) -> None:
-    """Refuse the first row of `turning` that does not have unit length."""
+    """Refuse rows of `turning` that do not have unit length; the error names the first one."""
     lengths = np.linalg.norm(points.turning, axis=1)
     for i in np.flatnonzero(np.abs(lengths - 1.0) > 0.01).tolist():
         raise points.wrong(
@@ -419,7 +419,7 @@ def _check_lengths(points: Points, name: str) -> None:
 
 
 def _with_quaternions(points: Points, convention: str) -> Points:
-    """Return points whose orientations, in a convention with angles in rad, become quaternions w, x, y, z."""
+    """Return points with orientations in a convention, angles in rad, converted to quaternions w, x, y, z."""
     if convention.startswith("quaternion"):
         _check_lengths(points, "quaternion")
     quaternions = quaternions_of(rotation_by(convention, points.turning))
@@ -429,7 +429,7 @@ def _with_quaternions(points: Points, convention: str) -> Points:
 def _with_rolls(points: Points) -> Points:
     """Return points with quaternions w, x, y, z in place of directions of the tool's z axis.
 
-    From each direction to the next, the tool turns about the normal of both; it never rolls about its own axis.
+    From each direction to the next, the tool turns about their common normal; it never rolls about its own axis.
     """
     from scipy.spatial.transform import Rotation
 
@@ -442,13 +442,13 @@ def _with_rolls(points: Points) -> Points:
     for i in np.flatnonzero(cosines < -1.0 + 1e-6).tolist():
         raise points.wrong(
             i,
-            "the tool's axis reverses from one row to the next",
+            "the tool axis reverses from one row to the next",
             hint="Add rows in between",
         )
     half_turns = np.column_stack([np.cross(before, axes), 1.0 + cosines])
     turns = Rotation.from_quat(half_turns)
     step = 1
-    while step < len(axes):  # the products of the first 1, 2, 3, ... turns
+    while step < len(axes):  # cumulative products of the turns
         turns = turns.concatenate([turns[:step], turns[step:] * turns[:-step]])
         step *= 2
     return replace(points, turning=with_like_signs(quaternions_of(turns * upright)))

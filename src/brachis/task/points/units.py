@@ -33,19 +33,19 @@ SPEEDS: Final = {
     "inch/min": 0.0254 / 60.0,
 }
 UNITS: Final = {"length": LENGTHS, "angle": ANGLES, "speed": SPEEDS}
-"""Factors to SI units, by kind of quantity."""
+"""Conversion factors to SI units, by kind of quantity."""
 
 
 @dataclass(frozen=True)
 class Convention:
-    """The meaning of the numbers of an orientation.
+    """A convention for the numbers that describe an orientation.
 
     Attributes
     ----------
     meaning : str
-        Meaning in words.
+        Meaning of the numbers, in words.
     makers : str
-        Manufacturers and software that use it.
+        Manufacturers and software that use the convention.
     euler : str
         SciPy's code for the axes of three angles: small letters for fixed axes, capitals for axes that turn with the
         tool; empty for a convention without such angles.
@@ -84,11 +84,11 @@ CONVENTIONS: Final = {
         "ZYZ",
     ),
 }
-"""Conventions by name."""
+"""Conventions for orientations, by name."""
 
 
 def choices(names: tuple[str, ...] = tuple(CONVENTIONS), suffix: str = "") -> str:
-    """List conventions with their meaning and users, for messages; `suffix` is added to conventions of angles."""
+    """List conventions with meaning and users, for messages; `suffix` is added to names of angle conventions."""
     listed = ((name, CONVENTIONS[name]) for name in names)
     return "; ".join(
         f"{name}{suffix if c.euler else ''} ({c.meaning}: {c.makers})"
@@ -114,7 +114,7 @@ def values_of(convention: str, rotation: Rotation) -> npt.NDArray[Any]:
     if convention == "rotation_vector":
         return rotation.as_rotvec()
     with warnings.catch_warnings():
-        # In gimbal lock, any of the many ways to write a rotation is fine.
+        # In gimbal lock, any of the many ways to write a rotation is accepted.
         warnings.filterwarnings("ignore", "Gimbal lock")
         return rotation.as_euler(CONVENTIONS[convention].euler)  # type: ignore[call-overload]
 
