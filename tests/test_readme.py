@@ -253,7 +253,7 @@ def test_example_10():
     assert all(result.verified for result in results.values())
     page = (DOCS / "phases.md").read_text()
     printed = re.search(
-        r"10_periodic_circle.py`: ([0-9.]+) s a turn, and ([0-9.]+) s", page
+        r"10_periodic_circle.py`: ([0-9.]+) s per turn, or ([0-9.]+) s", page
     )
     ours = [results[name].t_end for name in ("periodic", "rest to rest")]
     assert [float(each) for each in printed.groups()] == pytest.approx(ours, abs=0.006)
@@ -352,7 +352,7 @@ def test_robots_say_where_their_figures_come_from():
 def test_the_quick_start_plans_the_task_of_its_file():
     text = (ROOT / "docs/quick_start.md").read_text()
     cell = re.findall(r"```{code-cell}\n(.*?)```", text, flags=re.DOTALL)[0]
-    assert "The file `examples/01_scara_line.yaml` states the same task" in text
+    assert "examples/01_scara_line.yaml" in text
     names = {}
     exec(compile(cell, "quick_start.md", "exec"), names)  # noqa: S102
     file = brachis.load_task(ROOT / "examples/01_scara_line.yaml").to_dict()

@@ -131,7 +131,7 @@ REFUSED = {
     "period: 4": "period: out of range; found 4; allowed: <= 0.1",
     "formats: [krl]": "no format of samples named 'krl'",
     "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
-    "events: {start: x}": "no event of this name",
+    "events: {start: x}": "no event with this name",
     "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
 }
 
@@ -148,9 +148,9 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"dt": 0.001}, "no other period; found 0.001 s; allowed: 0.004 s"),
+        ({"dt": 0.001}, "not accept this period; found 0.001 s; allowed: 0.004 s"),
         ({"moves": "linear"}, "samples have no moves"),
-        ({"form": "json"}, "no such format; found json; allowed: csv, program"),
+        ({"form": "json"}, "not accept this format; found json; allowed: csv, program"),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         (
             {"form": "program", "time_tolerance": 1e-15},

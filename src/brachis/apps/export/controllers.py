@@ -119,8 +119,8 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
             where="joints",
             found=", ".join(f"{name} ({unit})" for name, unit in named),
             allowed="six revolute joints, starting at the base",
-            hint="List only the six joints of the arm in joints, and write a rail in another format. With a profile, hold "
-            "the rail (robot.locked_joints)",
+            hint="List only the six joints of the arm in joints, and write a rail in another format. With a profile, "
+            "hold the rail (robot.locked_joints)",
         )
     first, *postures = (
         f"[{', '.join(map(repr, row))}]" for row in rows.samples.q.tolist()
