@@ -114,7 +114,7 @@ REASONS = {
         "limits: {position: {j1: [0.3, 0.8], j2: [-2.2, -1.9]}}",
         "redundant_joints: [j1]",
         "the range of joint 'j",
-        r"within the joint ranges .*joint 'j2' 0.\d+ rad beyond its range, -2.2 to -1.9 rad",
+        r"within the joint ranges .*joint 'j2' is 0.\d+ rad beyond its range, -2.2 to -1.9 rad",
     ),
     "gravity": (
         "{gravity: [0, -9.81, 0], limits: {torque: [280.0, 200.0, 100.0]}}",

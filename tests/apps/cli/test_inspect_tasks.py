@@ -120,4 +120,4 @@ def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path):
         <geom size="0.1" pos="0 0 1"/></body></worldbody></mujoco>"""
     )
     for _ in range(2):
-        assert run(f"inspect {file}").err.count("left out: collision shapes (1)") == 1
+        assert run(f"inspect {file}").err.count("no counterpart: collision shapes (1)") == 1
