@@ -74,7 +74,7 @@ def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
     monkeypatch.chdir(saved)
     before = contents(saved)
     outcome = run(command, code=2)
-    reasons = "overwrite an input|of another kind|a known format"
+    reasons = "overwrite an input|of a different kind|a known format"
     assert re.search(reasons, outcome.err)
     assert contents(saved) == before
 
