@@ -256,7 +256,7 @@ def test_margins_that_are_not_analytic_are_errors(arm, plane):
             return np.abs(np.cos(q[:, :1]))
 
     inner = find(arm, plane, ["j3"]).solver
-    with pytest.raises(NotApplicableError, match="have to be analytic"):
+    with pytest.raises(NotApplicableError, match="must be analytic"):
         check_answers(arm, plane, (2,), Rough(inner, lambda answers: answers))
 
 

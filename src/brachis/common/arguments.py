@@ -24,7 +24,7 @@ def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
     Raises
     ------
     UnknownNameError
-        The keyword does not exist.
+        A keyword argument does not exist.
     InputError
         A required argument is missing, or there are too many positional arguments.
     """
@@ -157,7 +157,7 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     Raises
     ------
     InputError
-        It is something else.
+        The value is not a number or an array of numbers.
     """
     with suppress(TypeError, ValueError):
         if np.asarray(value).dtype.kind in "fiuU":  # neither None nor booleans
@@ -179,7 +179,7 @@ def count(value: int, where: str) -> int:
     Raises
     ------
     InputError
-        It is something else.
+        The value is not a whole number, or is below 1.
     """
     allowed = "a whole number >= 1"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):

@@ -134,7 +134,7 @@ def file_name(value: object, where: str) -> Path:
     Raises
     ------
     InputError
-        The value is something else.
+        The value is not the name of a file.
     """
     if not isinstance(value, str | os.PathLike):
         raise InputError(
@@ -382,12 +382,12 @@ def check_kind(
     expected : str
         A `Kind`, or the name of a kind that cannot be recognised.
     error : type
-        Class of the error.
+        Class of the error to raise.
 
     Raises
     ------
     InputError
-        Of the class `error`.
+        The file is of a different kind; the error is of the class `error`.
     """
     kind = kind_of(path)
     if kind not in (None, expected):
@@ -415,7 +415,7 @@ def read_text(
     Parameters
     ----------
     path : Path
-        The file.
+        Path of the file to read.
     where : str
         Place shown in messages: the file itself, or the key of the task that names the file.
     folder : Path, optional
@@ -427,7 +427,7 @@ def read_text(
     hint : str, optional
         Advice if the file is too long or, without `folder`, if it is missing.
     error : type, optional
-        Class of the error.
+        Class of the error to raise.
 
     Raises
     ------

@@ -6,8 +6,9 @@ motion, these solutions are distinguished by continuity.
 
 If a closed form solves for one joint after the other, det J_nr is a product of factors. Each step brings a component or
 a distance of a position to a given value. The derivative of this condition with respect to the joint of the step is, up
-to its sign, a factor. The two solutions of a step differ by the sign of its factor, and meet where it vanishes. The
-factors divided by their largest magnitudes are the branch margins, so a branch ends exactly where J_nr is singular.
+to its sign, a factor. The two solutions of a step differ by the sign of the step's factor, and meet where this factor
+vanishes. The factors divided by their largest magnitudes are the branch margins, so a branch ends exactly where J_nr is
+singular.
 
 A step in which all joints are prismatic has only one solution. If the sign of its factor changes with the redundant
 joints, ``left`` and ``right`` are two branches, of which only one exists at a time.
@@ -131,7 +132,7 @@ class FactoredSolver(FormulaSolver):
     joints : RemainingJoints
         The joints, in the order in which the solver solves for them.
     factors : tuple of Factor
-        The factors of the steps.
+        Factors of det J_nr, one for each step.
     """
 
     def __init__(

@@ -265,7 +265,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     Returns
     -------
     (count, 2, 8, 6) ndarray
-        Solutions, followed by NaN.
+        Solutions by sample and sign, followed by NaN.
     """
     marks = 0.5 + joints / TURN
     keys = np.zeros(len(joints), dtype=np.int64)

@@ -2,7 +2,7 @@
 
     f(q) = z,  C q = c:        [J; C] dq = (z - f(q), c - C q)
 
-for a batch of K postures at once, in the kernel.
+These equations are solved for a batch of K postures at once, in the kernel.
 
 If only a solution next to the given posture is accepted, each step must be at most half the previous one. The method
 then converges to such a solution; see P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural
@@ -63,7 +63,7 @@ class Newton:
         Parameters
         ----------
         targets : (K, c) ndarray
-            Task coordinates z.
+            Task coordinates z to reach.
         q : (K, n) ndarray
             Postures from which the search begins.
         rows : (K, r, n) ndarray

@@ -21,8 +21,9 @@ Here p slides along s, and R with the letter of a joint is its rotation. In all 
     theta    turns e to R_G e about n,                  G D0 = G P + R_n(theta) (D0 - P)
     elbow    |E_c D0 - B| = |G D0 - B|   for c (2),     b turns E_c D0 to G D0
 
-with B, D0 on the axes b, d, and w in place of e if e is missing; d follows from theta. If the last joints of a chain
-have the structure of the first ones above, it is solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
+Here B and D0 are points on the axes b and d. If e is missing, w takes its place. The angle of d follows from theta. If
+the last joints of a chain have the structure shown above for the first joints, the chain is solved in the reverse
+order, E_6^-1 ... E_1^-1 = D^-1.
 
 Branches are distinguished by the signs of these factors, whose product is det J_nr:
 

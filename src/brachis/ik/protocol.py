@@ -40,13 +40,13 @@ class IKSolver(ABC):
         targets : (K, c) ndarray
             Task coordinates; see `TaskMap` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
-            Redundant joints, in chain order.
+            Positions of the redundant joints, in chain order.
 
         Returns
         -------
         (K, B, A, m) ndarray
-            Non-redundant joints, in chain order. Angles may be in any turn. Entries without a solution are NaN; in each
-            branch, they come last.
+            Non-redundant joints, in chain order. Angles may include any number of whole turns. Entries without a
+            solution are NaN; in each branch, they come last.
         """
 
     def solve_branch(
@@ -65,9 +65,9 @@ class IKSolver(ABC):
         Parameters
         ----------
         q : (K, n) ndarray
-            All joints; real or complex.
+            Positions of all joints; real or complex.
         branch : int
-            Index into `branches`.
+            Index of the branch in `branches`.
 
         Returns
         -------

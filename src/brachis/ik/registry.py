@@ -351,7 +351,7 @@ class _Matcher:
     def _name_rounding(
         self, redundant: tuple[int, ...], reasons: dict[str, str]
     ) -> None:
-        """Record which families would fit if the axes were closer to those of the ideal arm."""
+        """Record which families would fit if the axes were closer to the axes of the ideal arm."""
         rough = self._rough
         if rough is None or max(rough.turned, rough.shifted) < TOLERANCE:
             return

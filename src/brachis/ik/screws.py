@@ -35,7 +35,7 @@ class Screw:
     Attributes
     ----------
     axis : (3, ...) ndarray
-        Unit direction.
+        Unit vector along the axis of the joint.
     point : (3, ...) ndarray
         A point on the axis, m; without meaning for a slide.
     revolute : bool
@@ -145,7 +145,7 @@ class PosedScrews:
     points : (3, n, K) ndarray
         A point on each axis of rotation, m; without meaning for prismatic joints.
     tool_position : (3, K) ndarray
-        m.
+        Position of the tool, m.
     tool_rotation : (3, 3, K) ndarray
     revolute : (n,) bool ndarray
     """
@@ -190,7 +190,7 @@ class Poses:
     Attributes
     ----------
     position : (3, ..., N) ndarray
-        m.
+        Positions of the poses, m.
     rotation : (3, 3, ..., N) ndarray
     """
 

@@ -1,15 +1,16 @@
 """Chains whose axes are parallel, perpendicular or meeting except for rounded figures, as in rpy="1.5708 0 0".
 
 The ideal chain follows the given one from the base to the tool. The direction of a joint is compared with the
-directions that no joint turns relative to it: those of the revolute joint before it and of the slides in between. If it
-is parallel to one of these to within a tolerance, it becomes exactly parallel. Otherwise, if it is almost perpendicular
-to some of them, it becomes exactly perpendicular. A revolute axis that almost meets the previous one, or almost
-coincides with it, is moved onto it. If the previous axis meets its own predecessor nearby, the axis is moved into the
-same point. Every rotation or shift carries the rest of the chain and the tool along, so errors do not add up along the
-chain. Relations that follow from neighbours, such as three parallel axes or three axes that meet in one point, then
-hold exactly.
+directions that no joint turns relative to it: those of the revolute joint before it and of the slides in between. If
+the direction is parallel to one of these to within a tolerance, it becomes exactly parallel. Otherwise, if the
+direction is almost perpendicular to some of these, it becomes exactly perpendicular. A revolute axis that almost meets
+the previous one, or almost coincides with it, is moved onto it. If the previous axis meets its own predecessor nearby,
+the axis is moved into the same point. Every rotation or shift carries the rest of the chain and the tool along, so
+errors do not add up along the chain. Relations that follow from neighbours, such as three parallel axes or three axes
+that meet in one point, then hold exactly.
 
-The solutions of the ideal chain's closed forms are close to those of the given chain. Newton's method refines them.
+The closed forms of the ideal chain give solutions close to the solutions for the given chain. Newton's method refines
+them.
 """
 
 from __future__ import annotations

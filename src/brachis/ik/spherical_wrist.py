@@ -2,9 +2,9 @@
 
 Let W0 be this point with the six joints at zero. Then E_1 ... E_6 = D (`FactoredSolver`) moves it to
 
-    W = E_a E_b E_c W0 = D W0,
+    W = E_a E_b E_c W0 = D W0.
 
-because the last three joints u, v, w turn about it. These equations contain only the first three joints a, b, c
+The last three joints u, v, w turn about this point, so these equations contain only the first three joints a, b, c
 (`point_recipes`). What remains is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
     v    u . R_v w = u . R w, two solutions

@@ -60,7 +60,7 @@ def septic(start: Array, end: Array, length: float) -> SplineCurve:
     start, end : ndarray, shape (4, m)
         Value and first, second and third derivatives with respect to sigma.
     length : float
-        Range of sigma.
+        Range of sigma over which the polynomial extends.
     """
     from scipy.interpolate import BPoly
 
@@ -149,7 +149,7 @@ class ArcCurve:
     length : float
         Length of the curve, m.
     turn : float
-        Angle per unit sigma, rad/m.
+        Angle by which the curve turns per unit sigma, rad/m.
     slope : ndarray, shape (m,)
         Climb along the axis per unit sigma; in the row of an angle, the slope of the angle, rad/m.
     """

@@ -33,7 +33,7 @@ class Join:
     Attributes
     ----------
     first, second : Curve
-        The curves that meet.
+        The two curves that meet at the join.
     index : int
         Index of the segment that ends.
     s : float
@@ -217,7 +217,7 @@ def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str
     before, after : ndarray, shape (4, c)
         Derivatives of the coordinates of the pose with respect to sigma at the join.
     unit : str
-        Unit of sigma.
+        Unit of the curves' parameter sigma.
     """
     old, new = (angular_rates(derivatives) for derivatives in (before, after))
     jumps = np.linalg.norm(new - old, axis=1)

@@ -26,7 +26,7 @@ class PosePath(Path):
         Parameters
         ----------
         s : array_like, shape (K,)
-            Path coordinates.
+            Path coordinates at which to sample.
         """
         derivatives = self.derivatives(s)
         return PathSample(derivatives[0], *body_twists(derivatives))

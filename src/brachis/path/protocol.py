@@ -77,7 +77,7 @@ class MappedCurve:
     Attributes
     ----------
     curve : Curve
-        The other curve.
+        The curve whose coordinates are mapped.
     function : callable
         Function of sigma, shape (K,), and of the curve's coordinates and derivatives, shape (order + 1, K, c).
     """

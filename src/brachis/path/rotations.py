@@ -36,7 +36,7 @@ def product(first: Array, second: Array, how: str) -> Array:
     Parameters
     ----------
     first, second : ndarray, shape (order + 1, ...)
-        Derivatives of the factors.
+        Derivatives of the two factors.
     how : str
         Rule for the product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
     """

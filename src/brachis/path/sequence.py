@@ -30,7 +30,7 @@ class PathFrame:
     Attributes
     ----------
     turn : (c, c) ndarray
-        Orthogonal matrix.
+        Orthogonal matrix that turns coordinates into the world frame.
     origin : (c,) ndarray
         World coordinates of the frame's origin, m and rad.
     """
@@ -128,7 +128,7 @@ class Path:
     total : float
         Sum of the parameter ranges of all curves of the whole path; sigma per unit s.
     positions : int
-        Number of position rows.
+        Number of position rows among the coordinates.
     frame : PathFrame or None
         Frame in which the curves are given; None means the world.
     stops : ndarray

@@ -60,9 +60,9 @@ def pose_spline(
     Parameters
     ----------
     shape : SplineThrough
-        The waypoints, with orientations.
+        The waypoints of the segment, with orientations.
     context : SegmentContext
-        Place of the segment, in position rows.
+        Context of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 
@@ -212,9 +212,9 @@ def _chord_knots(
     otherwise : ndarray, shape (n - 1,)
         Distances to use if all positions are the same, rad.
     shape : SplineThrough
-        The waypoints.
+        The waypoints of the segment.
     context : SegmentContext
-        Place of the segment.
+        Context of the segment.
 
     Raises
     ------
@@ -315,9 +315,9 @@ def pose_bspline(
     Parameters
     ----------
     shape : BSplineCurve
-        Control points with quaternions.
+        The curve's control points, with quaternions.
     context : SegmentContext
-        Place of the segment, in position rows.
+        Context of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 

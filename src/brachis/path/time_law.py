@@ -156,9 +156,9 @@ def _interpolate(
     breaks : (N + 1,) ndarray
         Path coordinates of the knots.
     is_double : (N + 1,) ndarray
-        Whether a knot occurs twice.
+        Whether each knot occurs twice.
     ends : (2, 4) ndarray
-        As in `TimeLaw`.
+        Values and rates of s at both ends, as in `TimeLaw`.
     """
     from scipy.interpolate import make_interp_spline
 

@@ -27,7 +27,7 @@ class PhaseSpline(Summary):
     Attributes
     ----------
     t_end : float
-        Duration, s.
+        Duration of the phase, s.
     knots : (N + 2 d + 1,) ndarray
         Clamped knots in normalised time from 0 to 1.
     degree : int

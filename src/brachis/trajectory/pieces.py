@@ -36,7 +36,7 @@ class Pieces:
     Attributes
     ----------
     c : (m + 1, L, n) ndarray
-        Bernstein coefficients.
+        Bernstein coefficients of the pieces.
     x : (L + 1,) ndarray
         Times at which the pieces begin and end, s.
     """

@@ -154,7 +154,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 
 def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Read the metadata and the arrays. Only their types are checked."""
+    """Read the metadata and the arrays. Only the types of these parts are checked."""
     if not zipfile.is_zipfile(stream):
         raise ValueError("the file is not an npz archive")
     with zipfile.ZipFile(stream) as archive:

@@ -28,9 +28,9 @@ class Samples(Summary):
     Attributes
     ----------
     t : (K,) ndarray
-        Times, s.
+        Times of the samples, s.
     s : (K,) ndarray
-        Path coordinate, dimensionless.
+        Path coordinates, dimensionless.
     q, qdot, qddot : (K, n) ndarray
         Joint positions (rad or m), velocities and accelerations.
     tau : (K, n) ndarray or None
@@ -129,7 +129,7 @@ def tool_motion(
     Returns
     -------
     position : (K, 3) ndarray
-        Positions, m.
+        Positions of the tool frame, m.
     quaternion : (K, 4) ndarray
         Unit quaternions w, x, y, z, with signs chosen so that successive quaternions are close.
     speed : (K,) ndarray

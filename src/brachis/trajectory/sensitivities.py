@@ -80,7 +80,7 @@ class TaskSaving:
     change : str
         The change in words, for example ``without the dwell at s = 0.3``.
     saved : float
-        Time saved, s.
+        Time that the change saves, s.
     accuracy : {"exact", "estimate", "least", "bound"}
         Whether `saved` is exact, an estimate, an estimated minimum, or an upper bound along the same joint path.
     """

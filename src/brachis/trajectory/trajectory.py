@@ -59,13 +59,13 @@ class Trajectory(Summary):
     times : (L + 1,) ndarray
         Times of the nodes, from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
-        Joint motion at the nodes.
+        Joint positions, velocities and accelerations at the nodes.
     qddot_before : (L + 1, n) ndarray
         Acceleration just before the nodes. It differs from `qddot` at knots of splines of degree 2.
     knots : ndarray
         B-spline knots in normalised time; N + 2 d + 1 for a single phase. A knot where phases meet occurs d + 1 times.
     degree : int
-        B-spline degree d.
+        Degree d of the B-splines.
     control_points : (1 + r, N + d) ndarray
         Control points of s (dimensionless), then of each redundant joint (rad or m) in chain order or of the chart's
         coordinates sigma.
@@ -279,7 +279,7 @@ class Trajectory(Summary):
         Parameters
         ----------
         dt : float
-            Period, s.
+            Sampling period, s.
         last : {"exact", "hold"}, optional
             Time of the last sample. ``exact``: the last sample is at t_end, so the last period may be shorter.
             ``hold``: the last sample is at the first multiple of `dt` at or after t_end, with the end posture held at
@@ -296,7 +296,7 @@ class Trajectory(Summary):
             `dt` is not positive, or so small that there would be more than ten million samples; or `last` is ``hold``
             and the motion does not end at rest.
         UnknownNameError
-            `last` has a different value.
+            `last` is neither ``exact`` nor ``hold``.
         """
         if last not in ("exact", "hold"):
             raise UnknownNameError("ending", last, ("exact", "hold"), where="last")

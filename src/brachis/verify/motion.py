@@ -46,7 +46,7 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     column : (Z,) int ndarray
         Index of the polynomial of each root, ascending.
     u : (Z,) ndarray
-        Roots, ascending within a polynomial.
+        Roots, ascending within each polynomial.
     """
     column = np.arange(coefficients.shape[1])
     low = np.zeros(len(column))

@@ -24,7 +24,7 @@ class Margin:
         Name of the margin.
     value : float
     unit : str
-        ``-`` or ``%``.
+        Unit of the value: ``-`` or ``%``.
     subject : str
         The joint that has this margin, or the arm.
     time : float
@@ -56,7 +56,7 @@ class Check:
     allowed : float
         Maximum value that passes.
     unit : str
-        ``-`` for ratios.
+        Unit of `value` and `allowed`; ``-`` for ratios.
     passed : bool
         Whether the value is at most the allowed one.
     subject : str or None

@@ -150,7 +150,7 @@ def path_errors(
     ----------
     motion : CheckedMotion
     q : (K, n) ndarray
-        Postures, rad or m.
+        Postures of the robot, rad or m.
     s : (K,) ndarray
     joints : tuple
         Result of `joint_placements` in these postures.

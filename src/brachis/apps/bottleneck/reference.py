@@ -43,7 +43,7 @@ class Reference:
     wall_time : float
         Wall time for computing the reference, s.
     candidate : FinishedCandidate
-        The reference motion.
+        The reference motion, as a finished candidate.
     """
 
     t_end: float

@@ -29,7 +29,7 @@ class LimitRatios(Summary):
         Times, ascending, s. Where a derivative that a limit needs jumps, the time occurs twice, for just before and
         just after the jump.
     labels : tuple of Label
-        Labels of the columns.
+        Labels of the columns of `values`.
     values : (K, c) ndarray
         Ratios: 1 at the upper limit and -1 at the lower limit. For a position, the ratio is 0 in the middle of the
         range. For a range with only one end, it is 1 minus the distance from this end, rad or m, but at least 0. For a
@@ -143,7 +143,7 @@ class ActiveInterval:
     Attributes
     ----------
     begin, end : float
-        Times, s.
+        Times at which the interval begins and ends, s.
     side : {"lower", "upper"}
         Which of the two bounds is active. For a torque, velocity or acceleration, ``lower`` is the negative bound.
     """
@@ -164,7 +164,7 @@ class Saturation(Summary):
     share : float
         Fraction of the motion time, 0 to 1, during which the limit is active.
     peak : float
-        Largest ratio to the limit.
+        Largest ratio of the value to the limit.
     is_drawn : bool
         Whether timelines show this value, which is so if it uses more than half of its limit and also changes or is
         active.

@@ -104,13 +104,13 @@ def write_files(
     Parameters
     ----------
     out : Path
-        Existing folder.
+        Existing folder into which the files are written.
     results, figures : mapping of str to callable
         Functions that write the files, by file name.
     listener : callable
         Function that is called with a text that says which figure is being drawn.
     stale : iterable of str, optional
-        Older files to remove.
+        Names of older files to remove.
 
     Returns
     -------

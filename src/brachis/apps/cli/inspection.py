@@ -338,7 +338,8 @@ def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
 def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     """List the name, type, axis, limits, mass and friction of every joint, with units.
 
-    The mass is that of the links between the joint and the next one. At the last joint it includes the payload.
+    The mass given for a joint is that of the links between this joint and the next one. For the last joint, the mass
+    includes the payload.
     """
     from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES

@@ -295,7 +295,7 @@ def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None
 
 @contextmanager
 def show_warnings() -> Iterator[None]:
-    """Print warnings of brachis as messages on standard error. A quiet command prints none."""
+    """Print warnings of brachis as messages on standard error. A quiet command prints no warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("default", BrachisWarning)
         usual = warnings.showwarning

@@ -279,7 +279,7 @@ def sweep(
         Plan nothing, but collect the plans of all parts in table.parquet and table.csv. If a plan is missing, this
         gives an error.
     retry : bool, optional
-        Plan failed plans again.
+        Run the failed plans again.
 
     Examples
     --------

@@ -112,7 +112,8 @@ def compare(
     Parameters
     ----------
     plan : path, optional
-        Result file (npz) of the plan that was run, or its folder, to show where the machine differed. Needs --profile.
+        Result file (npz) of the plan that was run, or its folder, to show where the machine differed from it. This
+        needs --profile.
     profile : str, optional
         Controller whose axes and units the CSV file uses; see brachis export.
     keep_end : bool, optional

@@ -51,7 +51,7 @@ _FIGURES: dict[str, tuple[str, tuple[int, ...], Callable[[np.ndarray], Any]]] = 
 
 
 def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
-    """Make file names of meshes and textures that are relative to the folder of `source` relative to that of `target`.
+    """Rewrite names of mesh and texture files: from relative to the folder of `source` to relative to that of `target`.
 
     Without `target`, the names become absolute. Names that are already absolute do not change; nor do names in packages
     that ROS finds, or that cannot be found.

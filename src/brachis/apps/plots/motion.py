@@ -283,8 +283,8 @@ def plot_timeline(
     -------
     Figure
         Figure two columns wide, with a row for each limited value that ever uses more than half of its limit. Rows that
-        hardly change are left out. A deeper blue is closer to the limit. Orange means that the limit is active: at 99 %
-        of it or more, including ripple down to 95 %. The faint ticks are the knots of the splines.
+        hardly change are left out. A deeper blue means closer to the limit. Orange means that the limit is active: at
+        99 % of it or more, including ripple down to 95 %. The faint ticks are the knots of the splines.
 
     Examples
     --------

@@ -163,7 +163,7 @@ class PanelRow:
     prismatic : tuple of str
         Title and symbol for prismatic joints, if these differ.
     is_range : bool
-        See `PanelCurve`.
+        Whether the limits are the ends of a range; see `PanelCurve`.
     needs_masses : bool
         Whether the values need the masses of the URDF.
     only_if_limited : bool
@@ -176,7 +176,7 @@ class PanelRow:
     name : str
         Name of the curve, if the row has only one curve.
     ends : (float or None, float or None)
-        See `Panel`.
+        Ends of the vertical axis; see `Panel`.
     """
 
     values: Callable[[Trajectory, Samples], np.ndarray]
@@ -276,9 +276,9 @@ def panels_of(
     samples : Samples
         Samples of the trajectory.
     *names : str
-        Titles from `PANELS`.
+        Titles of the panels, from `PANELS`.
     degrees : bool, optional
-        Whether angles are in degrees.
+        Whether to show angles in degrees.
 
     Returns
     -------

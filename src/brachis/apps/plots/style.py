@@ -231,7 +231,7 @@ def legend_above(
     ----------
     ax : Axes
     width : float
-        Available width, mm.
+        Width available for the legend, mm.
     lines : mapping of str to Artist, optional
         Entries of the legend. Default: the labelled artists of the axes.
     """

@@ -285,9 +285,9 @@ def _follow(
     -------
     list of Segment
     t : (K,) ndarray
-        Dense times, s.
+        Times at which this part is sampled densely, s.
     values : (K, c) ndarray
-        Task coordinates.
+        Task coordinates at these times.
     share : (K,) ndarray
         Distance travelled since the beginning of the part, as a fraction of the part's length.
     """

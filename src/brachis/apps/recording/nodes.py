@@ -48,7 +48,7 @@ class RecordedNodes:
     Attributes
     ----------
     t : (L,) ndarray
-        Times, s.
+        Times of the nodes, s.
     states : (3, L, n) ndarray
         Joint positions q, velocities qdot and accelerations qddot at the nodes.
     notes : tuple of str

@@ -159,7 +159,7 @@ def _read_column(
     base : {"s", "rad", "m"}
         SI unit of time, or of the joint's position.
     units : mapping
-        Units that the user states.
+        Units of angles, lengths and times that the user states.
 
     Raises
     ------
@@ -215,9 +215,9 @@ class Recording:
     Attributes
     ----------
     t : (K,) ndarray
-        Times, beginning with 0, s.
+        Times of the rows, beginning with 0, s.
     q : (K, n) ndarray
-        Positions, rad or m.
+        Joint positions, rad or m.
     qdot, qddot : (K, n) ndarray or None
         Velocities, rad/s or m/s, and accelerations, rad/s^2 or m/s^2, if the file has them.
     rounding : (n,) ndarray

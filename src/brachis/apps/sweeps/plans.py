@@ -49,9 +49,9 @@ class Plan:
     task : Task
         Task, with the content of all its files.
     urdf : str
-        Text of the URDF.
+        Text of the robot's URDF.
     version : str
-        Version of brachis.
+        Version of brachis that is to run the plan.
     """
 
     digest: str

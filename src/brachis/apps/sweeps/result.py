@@ -74,8 +74,8 @@ class Store:
     Parameters
     ----------
     folder : Path
-        Folder to use; it is created if it does not exist. If it contains files that do not belong to a sweep, this
-        gives an error.
+        Folder to use; it is created if it does not exist. If the folder contains files that do not belong to a sweep,
+        this gives an error.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class Store:
         Parameters
         ----------
         keys : sequence of str
-            The varied keys.
+            Keys of the task that were varied.
         rows : mapping of int to (mapping, mapping)
             Values of these keys, and columns of the outcome, by the number of the plan. Missing columns are null.
         name : str

@@ -309,7 +309,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are the tool's."""
+    """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are those of the tool."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     axes = list(task_map.axes)
     points = samples.tool_position.copy()

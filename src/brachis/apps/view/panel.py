@@ -161,7 +161,7 @@ class Playback:
     Attributes
     ----------
     t_end : float
-        End of the motion, s.
+        End time of the motion, s.
     rate : float
         Playback speed, as a fraction of real time.
     loops : bool

@@ -29,7 +29,7 @@ class ViewerScene:
     Attributes
     ----------
     samples : Samples
-        The motion at equidistant times.
+        Samples of the motion at equidistant times.
     bodies : Bodies
     layers : dict of str to list of handles
         Parts of the scene that can be shown and hidden, by name.

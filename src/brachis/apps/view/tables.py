@@ -25,9 +25,9 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
     ----------
     trajectory : Trajectory
     now : Samples
-        Samples at one time.
+        Sample of the trajectory at a single time.
     degrees : bool, optional
-        Whether angles are in degrees.
+        Whether to show angles in degrees.
     """
     place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
     lines = [

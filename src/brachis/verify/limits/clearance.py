@@ -163,7 +163,7 @@ class _Search:
 
 
 def _reaches(motion: CheckedMotion, scene: Scene) -> np.ndarray:
-    """Return how far points of pairs can be from the axes of the joints between them, (n, P), m.
+    """Return the largest distances, (n, P), m, of points of pairs of solids from the axes of the joints between them.
 
     The value is 1 for a prismatic joint, and 0 for a joint that moves both solids of a pair or neither of them.
     """

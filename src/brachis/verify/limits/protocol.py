@@ -58,7 +58,7 @@ def worst_between(
     ratio_at : callable
         ``ratio_at(states)`` returns the ratios, (K, c).
     subjects : sequence of str
-        Subjects of the c ratios.
+        Names of the subjects of the c ratios.
     states : MotionStates, optional
         Initial states. Default: the states of the whole motion.
 
