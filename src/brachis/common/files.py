@@ -84,7 +84,7 @@ def read_file(
     finally:
         os.close(descriptor)
     if len(content) > largest:
-        text = f"it is longer than {largest / 1e6:g}  MB, the maximum size that brachis reads"
+        text = f"it is longer than {largest / 1e6:g} MB, the maximum size that brachis reads"
         raise OSError(errno.EFBIG, text, os.fspath(path))
     return content
 

@@ -250,8 +250,8 @@ def build_path(
     Returns
     -------
     Path
-        The path in the world, three times continuously differentiable with respect to s except at its stops. For poses
-        it is a `PosePath`, whose samples have the body twist; for orientations with fewer position rows, an
+        The path in the world, three times continuously differentiable with respect to s except at its stops. For poses,
+        the path is a `PosePath`, whose samples have the body twist; for orientations with fewer position rows, an
         `OrientedPath`.
 
     Raises

@@ -1,6 +1,7 @@
 """Joint motion as polynomials between nodes.
 
-The polynomials are quintic Hermite pieces in Bernstein form, each relative to its first node. Their jerk is stored too.
+The polynomials are quintic Hermite pieces in Bernstein form, each relative to its first node. The jerk of the pieces is
+stored too.
 
 Positions are of the order of 1 rad, and the second differences of the coefficients are divided by h^2. If the node's
 position were part of the coefficients, its rounding alone would cause an error of 1e-16 / h^2 in the acceleration,

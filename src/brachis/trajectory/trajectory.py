@@ -43,9 +43,10 @@ class Trajectory(Summary):
     """Joint motion along a path.
 
     Joint positions are quintic polynomials between nodes. These polynomials agree with the closed form to within 1e-11
-    rad or m. Where they join, the position, the velocity and (from degree 3 on) the acceleration are continuous. The
-    path coordinate and the redundant joints are also stored as the B-splines that the optimiser found. If the motion
-    was planned in a chart, the chart's coordinates sigma of the self-motion take the place of the redundant joints.
+    rad or m. Where the polynomials join, the position, the velocity and (from degree 3 on) the acceleration are
+    continuous. The path coordinate and the redundant joints are also stored as the B-splines that the optimiser found.
+    If the motion was planned in a chart, the chart's coordinates sigma of the self-motion take the place of the
+    redundant joints.
 
     Attributes
     ----------
@@ -168,7 +169,7 @@ class Trajectory(Summary):
         return self._spline(self.control_points[1:].T)
 
     def _spline(self, control_points: np.ndarray) -> Spline:
-        """Make a spline over time in seconds. Its knots where phases meet are exactly at the ends of the phases."""
+        """Make a spline over time in seconds. Knots where phases meet are exactly at the ends of the phases."""
         times = self.knots * self.phase_ends[-1]
         first = find_phase_knots(self.knots, self.degree)[1:]
         times[first[:, None] + np.arange(self.degree + 1)] = self.phase_ends[:, None]
@@ -283,7 +284,7 @@ class Trajectory(Summary):
         last : {"exact", "hold"}, optional
             Time of the last sample. ``exact``: the last sample is at t_end, so the last period may be shorter.
             ``hold``: the last sample is at the first multiple of `dt` at or after t_end, with the end posture held at
-            rest. Its velocity and acceleration are zero, and its torque is the holding torque.
+            rest. The velocity and the acceleration of this sample are zero, and its torque is the holding torque.
 
         Returns
         -------

@@ -32,8 +32,8 @@ class LimitRatios(Summary):
         Labels of the columns of `values`.
     values : (K, c) ndarray
         Ratios: 1 at the upper limit and -1 at the lower limit. For a position, the ratio is 0 in the middle of the
-        range. For a range with only one end, it is 1 minus the distance from this end, rad or m, but at least 0. For a
-        process speed, it is 1 while the tool has this speed, and 0 otherwise.
+        range. For a range with only one end, the ratio is 1 minus the distance from this end, rad or m, but at least 0.
+        For a process speed, the ratio is 1 while the tool has this speed, and 0 otherwise.
     """
 
     t: np.ndarray

@@ -61,8 +61,8 @@ def inspect(
     """Show a robot's joints and its closed forms.
 
     The command prints the limits, mass and friction of every joint, and the choices of redundant joints that have a
-    closed form. With --verbose, it also prints the branches, the reasons why other choices have no closed form, and the
-    pairs of bodies that may collide.
+    closed form. With --verbose, the command also prints the branches, the reasons why other choices have no closed
+    form, and the pairs of bodies that may collide.
 
     Parameters
     ----------

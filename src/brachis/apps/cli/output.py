@@ -43,8 +43,8 @@ def print_table(
 ) -> None:
     """Print a table that fits the terminal. Text is wrapped; numbers are neither cut nor wrapped.
 
-    A table that is too wide is printed without lines. If it is still too wide, its columns are spread over several
-    tables, each of which repeats the first column.
+    A table that is too wide is printed without lines. If the table is still too wide, its columns are spread over
+    several tables, each of which repeats the first column.
 
     Parameters
     ----------
@@ -315,8 +315,8 @@ def show_warnings() -> Iterator[None]:
 def show_progress() -> Iterator[Callable[[str], None]]:
     """Yield a listener that shows the current step and notices Ctrl-C.
 
-    On a terminal it shows only the current step. A verbose command prints every step with the time since the command
-    line was loaded.
+    On a terminal, the listener shows only the current step. A verbose command prints every step with the time since the
+    command line was loaded.
     """
     verbosity = get_verbosity()
     is_shown = verbosity is Verbosity.NORMAL

@@ -15,7 +15,7 @@ jerk, the two velocities meet at the jump (subcell resolution: A. Harten, Journa
 There, the acceleration is made to change from the value on one side to the value on the other within a small fraction
 of the period.
 
-A recorded motion waits where several rows have the same posture. Between its waits, it moves along the path.
+A recorded motion waits where several rows have the same posture. Between its waits, such a motion moves along the path.
 """
 
 from __future__ import annotations

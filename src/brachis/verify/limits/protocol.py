@@ -65,7 +65,8 @@ def worst_between(
     Returns
     -------
     Worst
-        The largest ratio. If 100,000 more states are not enough to find it, an upper bound on it, with a remark.
+        The largest ratio. If 100,000 more states are not enough to find this ratio, `ratio` is an upper bound, with a
+        remark.
     """
     states = motion.states if states is None else states
     most_states = len(states.t) + 100_000
