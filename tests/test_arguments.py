@@ -150,7 +150,7 @@ def test_a_key_of_a_section_is_found_in_a_file():
         (lambda motion: export.write(motion, "x.csv", dt="a"), "dt: wrong type"),
         (
             lambda motion: motion.save("x.txt"),
-            r"x.txt: the suffix belongs to another format; found .txt; allowed: .npz",
+            r"x.txt: the suffix belongs to a different format; found .txt; allowed: .npz",
         ),
         (
             lambda _: brachis.robots.scara3.with_payload("5 kg"),
@@ -172,7 +172,7 @@ def test_files_of_motions_are_taken_as_motions(line_trajectory, tmp_path):
     export.write(str(tmp_path / "result.npz"), tmp_path / "motion.csv", dt=0.1)
     assert (tmp_path / "motion.csv").read_text().startswith("t,q_j1")
     with pytest.raises(
-        ResultFileError, match="the file is of another kind; found a task file"
+        ResultFileError, match="the file is of a different kind; found a task file"
     ):
         brachis.verify_trajectory(brachis.examples.scara_line)
 

@@ -212,7 +212,7 @@ def test_a_table_of_joints_in_any_order_has_its_start(tmp_path):
 
 
 def test_waypoints_that_begin_elsewhere_are_errors():
-    with pytest.raises(PathError, match=r"starts elsewhere.*rad or m off"):
+    with pytest.raises(PathError, match=r"does not start where.*rad or m off"):
         brachis.plan(
             "iiwa14", path=WAYPOINTS[1:], start=WAYPOINTS[0], task_space="joints"
         )

@@ -250,7 +250,7 @@ TURN = [{"turn": ABOUT_Y}]
         ("YYYY", "axis", TURN, ["rx, rz of the tool depend", "tool_roll"]),
         (SCARA, "pose", [{"line": {"by": [0.1, 0, 0]}}], ["such as [x, y, z, yaw]"]),
         (PALLETISER, ["x", "y", "pitch"], None, ["with j1, j4 about other axes", "[x, y, yaw]"]),
-        ("ZYZ", "axis", [{"line": {"by": [0.1]}}], ["not in the task space", "turn: {rotate"]),
+        ("ZYZ", "axis", [{"line": {"by": [0.1]}}], ["task space has no position rows", "turn: {rotate"]),
     ],
 )  # fmt: skip
 def test_rows_that_are_errors(word, space, path, texts):

@@ -161,7 +161,7 @@ def rows(robot, *names):
             (),
             "J_nr is singular everywhere: there is always a motion of the tool that needs j4",
         ),
-        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "this family solves only poses"),
+        (iiwa, (0, 1, 2, 3), ("x", "y", "z"), "this family solves only for poses"),
         (
             rail_arm,
             (1,),

@@ -73,7 +73,7 @@ def test_no_closed_form_names_every_reason():
         find(robot, task_map_of(robot, ["x", "y", "z"]), [])
     reasons = caught.value.reasons
     assert (
-        "all joints must be prismatic besides the redundant ones; revolute: j1, j2, j3"
+        "all joints except the redundant ones must be prismatic; revolute: j1, j2, j3"
         in reasons["prismatic"]
     )
     assert "j2 moves out of the plane in which j1 turns" in reasons["planar"]
@@ -107,7 +107,7 @@ def test_no_closed_form_lists_the_choices_that_have_one():
 def test_yaw_in_another_plane_than_the_joints_is_an_error():
     robot = planar_robot("RRR", "tilted")
     with pytest.raises(
-        DecompositionError, match="yaw turns in another plane than the joints"
+        DecompositionError, match="yaw turns in a different plane than the joints"
     ):
         find(robot, RowsAndAngle(robot, ("x", "y", "yaw"), tool_axis=0), [])
 
@@ -256,7 +256,7 @@ def test_margins_that_are_not_analytic_are_errors(arm, plane):
             return np.abs(np.cos(q[:, :1]))
 
     inner = find(arm, plane, ["j3"]).solver
-    with pytest.raises(NotApplicableError, match="have to be analytic"):
+    with pytest.raises(NotApplicableError, match="must be analytic"):
         check_answers(arm, plane, (2,), Rough(inner, lambda answers: answers))
 
 

@@ -174,7 +174,7 @@ def test_reasons():
     assert refusal(ON_RAIL.robot(), ()) == "7 joints left to solve for, not 6"
     assert (
         refusal(UR.robot(), (0, 1, 2), ["x", "y", "z"])
-        == "this family solves only poses"
+        == "this family solves only for poses"
     )
     steps = list(UR.steps)
     steps[5] = steps[5] @ placement((0.1, 0.0, 0.0))

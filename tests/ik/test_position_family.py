@@ -154,7 +154,8 @@ def test_refusals():
         RowsAndAngle(robot, ("x", "y", "yaw"), 0),
     ):
         with pytest.raises(
-            NotApplicableError, match="this family solves only the position: x, y and z"
+            NotApplicableError,
+            match="this family solves only for the position: x, y and z",
         ):
             positioning.build(geometry, space, (0, 4, 5, 6))
     with pytest.raises(NotApplicableError, match="4 joints left to solve for, not 3"):

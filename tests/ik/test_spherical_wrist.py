@@ -53,9 +53,9 @@ def test_which_joints_may_be_redundant_on_which_rail(rail, exist):
         elif redundant < 4:
             assert "no two neighbours among them move in one plane" in reason
         else:
-            assert "do not meet in a point: they miss it by 0." in reason
+            assert "do not meet in a point: they miss a common point by 0." in reason
             assert (
-                "the axes of j3, j2, j1 do not meet in a point: a joint slides"
+                "the axes of j3, j2, j1 do not meet in a point: one of the joints is prismatic"
                 in reason
             )
 
@@ -157,7 +157,7 @@ def test_a_slide_that_moves_the_centre_along_one_axis_of_the_wrist():
 
 
 def test_refusals():
-    with pytest.raises(NotApplicableError, match="this family solves only poses"):
+    with pytest.raises(NotApplicableError, match="this family solves only for poses"):
         spherical_wrist.build(
             ChainGeometry.of(rail_arm()),
             task_map_of(rail_arm(), ["x", "y", "z"]),

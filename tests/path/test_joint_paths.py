@@ -62,15 +62,15 @@ def test_bsplines_are_taken_as_they_are():
     assert_allclose(at(path, [0.0, 1.0]), [START, [1, 1, 1]], atol=1e-15)
     moved = build([{"bspline": {**CLAMPED, "relative": True}}], [1.1, 0.2, 0.3])
     assert_allclose(at(moved, 1.0), [[2, 1, 1]], atol=1e-15)
-    with pytest.raises(PathError, match="starts elsewhere"):
+    with pytest.raises(PathError, match="does not start where"):
         build([{"bspline": CLAMPED}], [0.2, 0.2, 0.3])
 
 
 REFUSED = [
-    ("circle: {center: [0, 0, 0]}", "a path of joints cannot have this segment"),
+    ("circle: {center: [0, 0, 0]}", "a joint path cannot have this segment"),
     (
         "turn: {rotate: {axis: [0, 0, 1], angle_deg: 3}}",
-        "a path of joints cannot have this segment",
+        "a joint path cannot have this segment",
     ),
     ("line: {length: 1, angle_deg: 3}", "needs 2 position rows"),
     ("line: {by: [1, 2]}", "found 2: .*joint a, joint b, joint x"),
@@ -78,7 +78,7 @@ REFUSED = [
         "spline: {through: [[1, 1, 1]], joints: [a, b, c]}",
         r"spline\.joints.*'c'.*a, b, x",
     ),
-    ("spline: {through: [[1, 1]], joints: [a, b]}", "not each named once"),
+    ("spline: {through: [[1, 1]], joints: [a, b]}", "must be named exactly once"),
     ("{line: {by: [1, 2, 3]}, orientation: fixed}", "needs a task space of poses"),
     (
         (

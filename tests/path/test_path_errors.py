@@ -120,7 +120,7 @@ SEGMENTS = [
     (
         "spline: {through: [[0, 0], [1, 1], [1, 1]]}",
         XY,
-        r"spline.through\[2\]: a waypoint repeats the one before",
+        r"spline.through\[2\]: a waypoint repeats the previous one",
     ),
     (
         "spline: {through: [[0, 0]]}",
@@ -138,7 +138,7 @@ SEGMENTS = [
     (
         "spline: {through: [[1, 1]], starts_at: [0, 0.0002]}",
         XY,
-        r"path\[0\].spline.starts_at: the segment starts elsewhere.*x = 0, y = 0, 0.0002 m off.*relative: true",
+        r"path\[0\].spline.starts_at: the segment does not start where.*x = 0, y = 0, 0.0002 m off.*relative: true",
     ),
     (
         "spline: {through: [[1, 1]], starts_at: [0]}",
@@ -184,7 +184,7 @@ def test_a_corner_names_place_angle_and_key():
     error = error_of([RIGHT, UP], XY)
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0: the path must be smooth to the third derivative; found a corner "
-        "of 90 degrees; allowed: segments that continue each other. Set path[0].blend (m) to "
+        "of 90 degrees; allowed: consecutive segments that match up to the third derivative. Set path[0].blend (m) to "
         "round it, or path[0].stop: true to stop there"
     )
     assert error.s_interval == pytest.approx((0.5, 0.5))
@@ -193,9 +193,9 @@ def test_a_corner_names_place_angle_and_key():
 @pytest.mark.parametrize(
     "angle, advice",
     [
-        (180.0, "each other. Set path[0].stop: true to stop there"),
-        (172.5, "each other. Set path[0].stop: true to stop there"),
-        (171.5, "each other. Set path[0].blend (m) to round it, or path[0]"),
+        (180.0, "the third derivative. Set path[0].stop: true to stop there"),
+        (172.5, "the third derivative. Set path[0].stop: true to stop there"),
+        (171.5, "the third derivative. Set path[0].blend (m) to round it, or path[0]"),
     ],
 )
 def test_a_way_back_is_offered_no_blend(angle, advice):

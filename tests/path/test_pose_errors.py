@@ -77,8 +77,8 @@ SEGMENTS = [
     (
         "{spline: {through: [[1, 0, 0], [1, 1.0e-09, 0], [2, 1, 0]]}, orientation: fixed}",
         (
-            r"path\[0\].spline.through\[1\]: a waypoint repeats the one before; found .*1e-09 \(m or rad\) away.*"
-            r"Remove one of both"
+            r"path\[0\].spline.through\[1\]: a waypoint repeats the previous one; found .*1e-09 \(m or rad\) away.*"
+            r"Remove one of the two"
         ),
     ),
     (
@@ -87,7 +87,7 @@ SEGMENTS = [
             "[{rpy_deg: [0, 0, 170]}, {rpy_deg: [0, 0, 0]}, {rpy_deg: [0, 0, 170]}, {rpy_deg: [0, 0, 0]}, "
             "{rpy_deg: [0, 0, 170]}]}"
         ),
-        r"path\[0\].spline.orientations\[.*differ too much, over too short a distance.*0.5 or more",
+        r"path\[0\].spline.orientations\[.*differ too much over too short a distance.*0.5 or more",
     ),
 ]
 
@@ -101,8 +101,8 @@ def test_a_jump_of_the_turning_rate_is_told_in_words():
     error = error_of([RIGHT | {"orientation": TURN}, RIGHT])
     assert str(error) == (
         "path[0] to path[1], at s = 0.5, x = 1, y = 0, z = 0: the path must be smooth to the third derivative; found "
-        "the tool's turning rate jumps by 1.571 rad/m; allowed: segments that continue each other. "
-        "Set profile: smooth where the tool turns, or path[0].blend (m) to round it, or "
+        "the tool's turning rate jumps by 1.571 rad/m; allowed: consecutive segments that match up to the third "
+        "derivative. Set profile: smooth where the tool turns, or path[0].blend (m) to round it, or "
         "path[0].stop: true to stop there"
     )
     assert error.s_interval == (0.5, 0.5)
@@ -155,7 +155,7 @@ def test_the_error_says_what_jumps_at_a_join(segments, message):
 
 def test_a_blend_beside_a_turn_on_the_spot():
     message = str(error_of([RIGHT | {"blend": 0.1}, {"turn": TURN}]))
-    assert "on one the tool turns on the spot" in message
+    assert "on one side the tool turns on the spot" in message
     assert "Turn the tool along a line" in message
 
 

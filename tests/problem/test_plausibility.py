@@ -584,7 +584,7 @@ def test_points_in_mm_or_in_another_order_do_not_start_where_the_tool_is():
     ):
         content = brachis.load_task(task(path=brachis.fit_path(given)))
         with warnings.catch_warnings(action="ignore"):
-            assert hint_of(content, PathError, "starts elsewhere") == hint
+            assert hint_of(content, PathError, "does not start where") == hint
 
 
 def test_a_quaternion_with_its_scalar_last():

@@ -325,7 +325,7 @@ def test_a_mesh_file_is_not_read_if_it_is_too_large(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "count, what", [(1650, "pairs that keep apart"), (4001, "bodies")]
+    "count, what", [(1650, "pairs to keep apart"), (4001, "bodies")]
 )
 def test_more_bodies_than_a_plan_has_memory_for_are_errors(count, what):
     bodies = [{"sphere": 0.01, "position": [4.0, 0.0, 0.01 * i]} for i in range(count)]

@@ -488,7 +488,7 @@ LAUGHS = "a0: &a0 [1]\n" + "".join(
         (
             "#" * 1_000_001,
             [
-                "it is longer than 1 MB, which is the most that is read",
+                "it is longer than 1 MB, the maximum size that brachis reads",
                 "waypoints belong in a CSV file",
             ],
         ),

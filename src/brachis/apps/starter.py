@@ -1,6 +1,6 @@
-"""A first task for a robot: a posture far from limits and singularities, and a straight line that starts there.
+"""A first task for a robot: a posture far from limits and singularities, and a straight line from there.
 
-If the URDF does not state limits that a plan needs, placeholders are used, and the task file marks them as such.
+If the URDF lacks limits that a plan needs, the task file contains placeholders and marks them as such.
 """
 
 from __future__ import annotations
@@ -40,16 +40,19 @@ from brachis.task.yaml_reader import read_yaml
 from brachis.timing import SlowTimingWarning
 
 _LENGTHS = (1.0, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01)
-"""Lengths of the lines that are tried, m."""
+"""Lengths of the lines that are tried, from long to short, m."""
 _QUICK = {
     "search.effort": "single",
     "search.time_limit": 20.0,
     "spline.intervals": 10,
     "search.least_motion": False,
 }
-"""Keys of the quick plan with which a task is tested."""
+"""Keys that are set for the quick plan with which a task is tested."""
 _LEAST_REACH = 1e-6
-"""Reach below which a tool counts as not moving, m. For a frame on a joint's axis, rounding gives far less."""
+"""Reach below which a tool counts as not moving, m.
+
+For a frame on a joint's axis, rounding gives a far smaller reach.
+"""
 
 
 @dataclass(frozen=True)
@@ -69,10 +72,11 @@ class Choice:
 
 
 def choices(task_map: TaskMap) -> Iterator[Choice]:
-    """Yield first motions, beginning with the most promising.
+    """Yield possible first motions, beginning with the most promising.
 
-    Postures with the tool above the robot's base come first. Nothing is found if the robot cannot move its tool in all
-    directions of the task space. The random draws have a fixed seed, so the same robot always gives the same result.
+    Postures with the tool above the robot's base come first. No motion is found if the robot cannot move its tool in
+    all directions of the task space. The random draws have a fixed seed, so the same robot always gives the same
+    result.
     """
     robot = task_map.robot
     postures = _draw_postures(robot)
@@ -80,20 +84,20 @@ def choices(task_map: TaskMap) -> Iterator[Choice]:
     for lowest in (0.1 * reach, -np.inf):
         quality = _quality(task_map, postures, reach, lowest)
         for k in np.argsort(-quality)[:4]:
-            if quality[k] > 1e-3:  # otherwise it is too close to a singularity
+            if quality[k] > 1e-3:  # otherwise the posture is too close to a singularity
                 line = _line(task_map, postures[k], float(quality[k]), reach, lowest)
                 if line is not None:
                     yield Choice(postures[k], line)
 
 
 def _measure_reach(robot: Robot, postures: np.ndarray) -> float:
-    """Measure how far the tool moves from the middle of its positions in postures (K, n), m."""
+    """Measure how far the tool's positions in postures (K, n) are from their middle, m."""
     positions, _ = robot.tool_placements(postures)
     return float(np.linalg.norm(np.ptp(positions, axis=0))) / 2.0
 
 
 def _draw_postures(robot: Robot) -> np.ndarray:
-    """Draw 400 postures in the inner part of all ranges, with two decimals, within 2 rad or m of zero if possible."""
+    """Draw 400 random postures inside all ranges, with two decimals, within 2 rad or m of zero if possible."""
     lower, upper = robot.limits.both_ways("position")
     # No motion begins in the outer 15 % at each end of a range.
     inner = 0.15 * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
@@ -108,7 +112,7 @@ def _draw_postures(robot: Robot) -> np.ndarray:
 def _quality(
     task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float
 ) -> np.ndarray:
-    """Rate postures (K, n) by the least singular value of the scaled task Jacobian, with and without the rail.
+    """Rate postures (K, n) by the smallest singular value of the scaled task Jacobian, with and without the rail.
 
     Positions and prismatic joints are divided by the arm's length. The rating is 0 if a joint needs much of its torque
     to hold the posture, or if the tool is lower than `lowest` above the base, m.
@@ -137,7 +141,7 @@ def _quality(
 def _line(
     task_map: TaskMap, posture: np.ndarray, quality: float, reach: float, lowest: float
 ) -> np.ndarray | None:
-    """Find the longest line along an axis on which the arm keeps 40 % of its dexterity; None if there is none."""
+    """Find the longest line along an axis on which the arm keeps 40 % of its rating; None if there is none."""
     count = len(task_map.axes)
     for length in _LENGTHS:
         if length > 0.25 * reach:
@@ -171,7 +175,7 @@ def _follow(
     for k in range(1, 11):
         target = task_map.of_placements(position + k * step, rotation)
         reached = newton.nearest(target, postures[-1:])
-        if not ((reached > lower) & (reached < upper)).all():  # NaN is outside
+        if not ((reached > lower) & (reached < upper)).all():  # NaN counts as outside
             return None
         postures = np.concatenate([postures, reached])
     return postures
@@ -180,10 +184,11 @@ def _follow(
 def placeholders(
     names: Sequence[str], stated: Sequence[UrdfLimit], *, has_masses: bool
 ) -> LimitSpec:
-    """Return limits for the joints for which a URDF states no usable ones. Stated limits are kept.
+    """Return limits for the joints for which a URDF states no usable limits. Stated limits are kept.
 
-    Torque limits without masses are not usable. Exporters write a limit of zero, or a range from zero to zero, if a
-    limit is missing. A joint without a torque limit gets an acceleration limit; otherwise its time would go to zero.
+    If there are no masses, torque limits are not usable. Exporters write a limit of zero, or a range from zero to zero,
+    if a limit is missing. A joint without a torque limit gets an acceleration limit; otherwise its time would go to
+    zero.
     """
     limits: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     for name, limit in zip(names, stated, strict=True):
@@ -199,7 +204,7 @@ def placeholders(
 
 
 def spaces(robot: Robot) -> Iterator[str | list[str]]:
-    """Yield task spaces that may suit a robot: the most natural first, then fewer and fewer position rows."""
+    """Yield task spaces that may suit a robot: the most natural one first, then fewer and fewer position rows."""
     yield default_task_space(robot)
     for count in range(min(robot.n, len(AXES)), 0, -1):
         yield from map(list, combinations(AXES, count))
@@ -260,7 +265,7 @@ def task_text(
     limits : LimitSpec
         Placeholders for limits that the URDF does not state.
     folder : Path
-        Folder in which the task file will be.
+        Folder for the task file.
     """
     source = Path(robot.source)
     redundant = robot.n - (6 if space == "pose" else len(space))
@@ -318,7 +323,7 @@ def _limits(robot: Robot, limits: LimitSpec) -> str:
 
 @dataclass(frozen=True)
 class Starter:
-    """A first task.
+    """A first task for a robot, with its verified plan.
 
     Attributes
     ----------
@@ -342,17 +347,18 @@ def starter_task(
     base_frame: str | None = None,
     listener: Callable[[str], None] | None = None,
 ) -> Starter:
-    """Write a commented task for a robot: a short line from a good posture, with everything else left open.
+    """Write a commented task for a robot: a short line from a good posture, with all other settings left open.
 
     Parameters
     ----------
     urdf : path
     folder : path, optional
-        Folder in which the task file will be. The path of the URDF in the task is relative to it if it is close.
+        Folder for the task file. The path of the URDF in the task is relative to this folder if the URDF is close to
+        it.
     tool_frame, base_frame : str, optional
         As in a task. Default: the ends of the chain with the most joints, as `default_chain` finds them.
     listener : callable, optional
-        Called with a text about each step.
+        Function that is called with a text about each step.
 
     Raises
     ------
@@ -392,18 +398,19 @@ def starter_task(
             found=f"{robot.base_frame} -> {robot.tool_frame} with {', '.join(robot.joint_names)}",
             hint="Choose another tool frame, farther along the chain",
         )
-    deadline = Deadline.after(90.0)  # s; after that no further task space is tried
+    # After these seconds, no further task space is tried.
+    deadline = Deadline.after(90.0)
     changes = {**_QUICK, "robot.urdf": str(path.absolute())}
     for space in spaces(robot):
         words = space if isinstance(space, str) else ", ".join(space)
-        tell(f"looking for a first motion that prescribes {words}")
+        tell(f"looking for a first motion with {words} prescribed")
         bound, task_map = bind(robot, space)
         for choice in () if deadline.passed else choices(task_map):
             written = task_text(bound, space, choice, limits, Path(folder))
             content: Any = read_yaml(written, "starter task")
             task = load_task(content, changes=changes)
             with suppress(PlanningError), warnings.catch_warnings():
-                # This plan has few intervals; the task itself gets as many as it needs.
+                # This plan has few intervals; the task itself will get as many as it needs.
                 warnings.simplefilter("ignore", SlowTimingWarning)
                 result = planner.plan(task, listener=tell, check_advice=False)
                 if result.verified:

@@ -1,4 +1,4 @@
-"""Checks of the arguments of public functions: wrong names and types are refused like any other wrong input."""
+"""Checks of the arguments of public functions: wrong names and types are rejected like any other wrong input."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _R = TypeVar("_R")
 
 
 def check_keywords(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function refuse unknown keywords, in a message that names the existing ones.
+    """Make a function reject unknown keyword arguments with a message that lists the existing ones.
 
     Raises
     ------
     UnknownNameError
-        The keyword does not exist.
+        A keyword argument does not exist.
     InputError
         A required argument is missing, or there are too many positional arguments.
     """
@@ -106,7 +106,7 @@ def check_array(
 ) -> None:
     """Raise an error unless the value is an array of real numbers with this shape.
 
-    `remark` is text after the shape of the value, for example " for 2 moments".
+    `remark` is text that the message shows after the shape of the value, for example " for 2 moments".
 
     Raises
     ------
@@ -157,7 +157,7 @@ def numbers(value: ArrayLike, where: str, unit: str) -> np.ndarray:
     Raises
     ------
     InputError
-        It is something else.
+        The value is not a number or an array of numbers.
     """
     with suppress(TypeError, ValueError):
         if np.asarray(value).dtype.kind in "fiuU":  # neither None nor booleans
@@ -179,7 +179,7 @@ def count(value: int, where: str) -> int:
     Raises
     ------
     InputError
-        It is something else.
+        The value is not a whole number, or is below 1.
     """
     allowed = "a whole number >= 1"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
@@ -192,7 +192,7 @@ def count(value: int, where: str) -> int:
 def check_most(
     value: float, largest: float, unit: str, problem: str, where: str, hint: str = ""
 ) -> None:
-    """Refuse a size or a count, in a unit, that needs too much time or memory for a plan.
+    """Reject a size or a count above `largest`, because it would need too much time or memory.
 
     Raises
     ------

@@ -15,7 +15,7 @@ _Found = TypeVar("_Found")
 class LastCall(Generic[_Found]):
     """A function of an array, (K,), that remembers its last result.
 
-    A second call with the same values returns the same result. Do not write to it.
+    A second call with the same values returns the same array. Callers must not write to this array.
 
     Parameters
     ----------
@@ -71,18 +71,18 @@ def interpolate_columns(
 
 
 def cut(values: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """Return the ascending numbers, (P,), that lie between `begin` and `end`, with these two at both ends."""
+    """Return the ascending numbers, (P,), that lie between `begin` and `end`, with `begin` and `end` added."""
     inside = values[(values > begin) & (values < end)]
     return np.concatenate([[begin], inside, [end]])
 
 
 def drop_near(values: np.ndarray, least: float) -> np.ndarray:
-    """Leave out those of ascending numbers, (P,), that are at most `least` below the next number."""
+    """Leave out each of the ascending numbers, (P,), that is at most `least` below the next one."""
     return values[np.append(np.diff(values) > least, True)]
 
 
 def count_each(counts: np.ndarray) -> np.ndarray:
-    """Count from 0 for each of several counts, (N,), one after the other: 2 and 3 give 0, 1, 0, 1, 2."""
+    """Count up from 0 once for each of several counts, (N,): the counts 2 and 3 give 0, 1, 0, 1, 2."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
@@ -114,12 +114,12 @@ def bisect(
     Parameters
     ----------
     is_before : callable
-        Tells for trial numbers, (P,), whether the condition still holds there.
+        Function that returns for trial numbers, (P,), whether the condition still holds there.
     end : (P,) ndarray
     """
     low = np.zeros(len(end))
     high = end
-    for _ in range(45 if len(end) else 0):  # to 3e-14 of the end
+    for _ in range(45 if len(end) else 0):  # to within 3e-14 of `end`
         middle = 0.5 * (low + high)
         before = is_before(middle)
         low = np.where(before, middle, low)
@@ -138,7 +138,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def apply_each(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Apply K matrices, (K, i, j), to K vectors, (K, j); several times faster for equal matrices of `broadcast_to`."""
+    """Apply K matrices, (K, i, j), to K vectors, (K, j); several times faster if `broadcast_to` repeats one matrix."""
     if len(vectors) and matrices.strides[0] == 0:
         return vectors @ matrices[0].T
     return np.einsum("kij,kj->ki", matrices, vectors)
@@ -191,13 +191,13 @@ def rates(
 
 
 def with_like_signs(quaternions: np.ndarray) -> np.ndarray:
-    """Return unit quaternions, (n, 4), with signs that make neighbours close; the first one keeps its sign."""
+    """Return unit quaternions, (n, 4), with signs that bring each close to the one before; the first keeps its sign."""
     unit = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
     signs = np.cumprod(np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0.0, -1.0, 1.0))
     return np.concatenate([unit[:1], signs[:, None] * unit[1:]])
 
 
 def greville(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Return the Greville abscissae, (N + d,), of a clamped knot vector: the times to which control points belong."""
+    """Return the Greville abscissae, (N + d,), of a clamped knot vector: one time for each control point."""
     windows = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree)
     return np.asarray(windows.mean(axis=1))

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Deadline:
-    """A moment on the monotonic clock, which all processes of a machine share; by default never.
+    """A moment on the monotonic clock, which all processes of a machine share. By default, it never comes.
 
     Attributes
     ----------
     at : float
-        s.
+        Time on the monotonic clock, s.
     """
 
     at: float = math.inf
@@ -26,24 +26,24 @@ class Deadline:
 
     @property
     def left(self) -> float:
-        """Time that is left, s; not negative."""
+        """Time left until the deadline, s; never negative."""
         return max(self.at - time.monotonic(), 0.0)
 
     @property
     def passed(self) -> bool:
-        """Whether the time is up."""
+        """Whether the deadline has passed."""
         return time.monotonic() > self.at
 
     def within(self, seconds: float) -> Deadline:
-        """Return this moment, or the moment this many seconds from now if that is earlier."""
+        """Return the earlier of this deadline and the moment this many seconds from now."""
         return Deadline(min(self.at, time.monotonic() + seconds))
 
     def part(self, share: float) -> Deadline:
-        """Return the moment at which a fraction of the remaining time is over."""
+        """Return the moment at which the given fraction of the remaining time has passed."""
         return self.within(share * self.left)
 
     def extend(self, seconds: float) -> Deadline:
-        """Return the moment this many seconds later."""
+        """Return a deadline that is this many seconds later."""
         return Deadline(self.at + seconds)
 
 

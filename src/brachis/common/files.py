@@ -26,7 +26,7 @@ from typing import BinaryIO
 from brachis.errors import InputError, TaskError
 
 LARGEST_TEXT = 16_000_000
-"""Largest size of a text file that is read, bytes."""
+"""Maximum size of a text file that brachis reads, bytes."""
 
 COMPOSED = "<!-- brachis compose -->"
 """Second line of a composed URDF, by which it is recognised."""
@@ -45,7 +45,7 @@ _TEMPORARY = re.compile(r"\.brachis-[0-9a-f]{8}-([0-9]+)-[0-9a-f]{16}\.part")
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Return whether a regular file exists; False for a name that the system refuses, where `Path.is_file` raises."""
+    """Return whether a regular file exists; False for a name that the system rejects (`Path.is_file` would raise)."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
@@ -60,7 +60,7 @@ def read_file(
     *,
     beginning: int | None = None,
 ) -> bytes:
-    """Read a regular file of at most `largest` bytes, or its first bytes. Files that never end are refused at once.
+    """Read a regular file of at most `largest` bytes, or only its first bytes. Pipes and devices are rejected.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def read_file(
     try:
         descriptor = os.open(
             path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC
-        )  # do not wait for the writer of a pipe
+        )  # do not wait for a process that writes to a pipe
     except ValueError as error:
         raise OSError(errno.EINVAL, f"not the name of a file: {error}") from error
     try:
@@ -79,12 +79,12 @@ def read_file(
             text = f"it is {kind}, not a file"
             raise OSError(errno.EINVAL, text, os.fspath(path))
         with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            # None: a file of the kernel has no data at present.
+            # None: a file of the kernel has no data at the moment.
             content = stream.read(beginning or largest + 1) or b""
     finally:
         os.close(descriptor)
     if len(content) > largest:
-        text = f"it is longer than {largest / 1e6:g} MB, which is the most that is read"
+        text = f"it is longer than {largest / 1e6:g} MB, the maximum size that brachis reads"
         raise OSError(errno.EFBIG, text, os.fspath(path))
     return content
 
@@ -101,7 +101,7 @@ _SPECIAL = {
 def temporary_in(folder: Path) -> Path:
     """Return a new temporary name in a folder, and remove the temporary files that killed processes left there.
 
-    Only files of this program are removed, whose process was on this host and no longer runs.
+    A file is removed only if a brachis process on this host wrote it and that process no longer runs.
     """
     # Several hosts may share a folder; each knows only its own process numbers.
     host = hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
@@ -134,7 +134,7 @@ def file_name(value: object, where: str) -> Path:
     Raises
     ------
     InputError
-        The value is something else.
+        The value is not the name of a file.
     """
     if not isinstance(value, str | os.PathLike):
         raise InputError(
@@ -147,7 +147,7 @@ def file_name(value: object, where: str) -> Path:
 
 
 def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
-    """Refuse a file name with the suffix of another format. A name without a suffix, or ending in digits, is accepted.
+    """Reject a file name with the suffix of another format. A name without a suffix, or ending in digits, is accepted.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
     suffix = file_name(path, "path").suffix
     if suffix and not suffix[1:].isdigit() and suffix.lower() != allowed:
         raise InputError(
-            "the suffix belongs to another format",
+            "the suffix belongs to a different format",
             where=os.fspath(path),
             found=suffix,
             allowed=allowed,
@@ -165,14 +165,14 @@ def check_suffix(path: str | os.PathLike[str], allowed: str, hint: str) -> None:
 
 
 def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
-    """Refuse to replace a file that does not begin like files that brachis writes. An empty file may be replaced.
+    """Refuse to replace a file unless it is empty or begins like the files that brachis writes.
 
     Parameters
     ----------
     path : path
         File to write.
     beginning : bytes
-        Pattern for the beginning of an older file.
+        Pattern that the beginning of an existing file must match.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
             content = stream.read(256)
     if content and not re.match(beginning, content, re.DOTALL):
         raise InputError(
-            "the file exists and is of another kind than the new one",
+            "the file exists and is of a different kind than the new one",
             where=os.fspath(path),
             found=f"a file that begins with {content[:24]!r}",
             allowed="a new file, or an older one of the same kind",
@@ -196,15 +196,15 @@ def check_beginning(path: str | os.PathLike[str], beginning: bytes) -> None:
 def atomic_write(
     path: str | os.PathLike[str], beginning: bytes = b""
 ) -> Iterator[BinaryIO]:
-    """Open a temporary file in the folder of `path`. It gets this name when the block has ended without an error.
+    """Open a temporary file beside `path`, and rename it to `path` when the block ends without an error.
 
     Parameters
     ----------
     path : path
-        File to write; a symbolic link is followed. If it is not a regular file (``/dev/stdout``, a named pipe), it is
-        written in place, because it must not be replaced by a file.
+        File to write; a symbolic link is followed. Anything but a regular file (``/dev/stdout``, a named pipe) is
+        written in place, because a regular file must not replace it.
     beginning : bytes, optional
-        Pattern for the beginning of an older file that may be replaced. Default: any file may be replaced.
+        Pattern that the beginning of an existing file must match to be replaced. Default: any file may be replaced.
 
     Yields
     ------
@@ -224,7 +224,7 @@ def atomic_write(
             in_place = not stat.S_ISREG(target.stat().st_mode)
         target = target if in_place else target.resolve()
         temporary = target if in_place else temporary_in(target.parent)
-        # Unlike a file of the module tempfile, a new file has the usual permissions.
+        # Unlike a file from the module tempfile, this new file has the usual permissions.
         file = temporary.open("wb" if in_place else "xb")
     try:
         content = io.BytesIO()
@@ -244,7 +244,7 @@ def atomic_write(
 
 @contextmanager
 def writing_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an `OSError` of the block, or the error of a name with a zero byte, into an `InputError`."""
+    """Turn an `OSError` within the block, or the error for a name with a zero byte, into an `InputError`."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -275,12 +275,12 @@ def shipped_robots() -> tuple[str, ...]:
 
 def absolute_path(name: str, folder: Path) -> str:
     """Return the absolute path of a file relative to `folder`."""
-    # Not Path.resolve: a linked folder keeps its name, because the URDF's meshes may be beside it.
+    # Not Path.resolve: a linked folder must keep its own path, because the URDF's meshes may be beside the link.
     return os.path.abspath(folder / name)  # noqa: PTH100
 
 
 def locate_urdf(name: str, folder: Path) -> str:
-    """Return the absolute path of a URDF: a file relative to `folder`, or else the URDF of an included robot."""
+    """Return the absolute path of a URDF: a file relative to `folder` or, if there is none, an included robot."""
     local = absolute_path(name, folder)
     included = shipped_folder("robots") / name / "robot.urdf"
     is_name = Path(name).name == name and not is_file(local)
@@ -288,9 +288,9 @@ def locate_urdf(name: str, folder: Path) -> str:
 
 
 def mesh_file(name: str, folder: Path) -> Path | None:
-    """Find a mesh file that a URDF in `folder` names as a path, ``file://`` or ``package://``; None if it is missing.
+    """Find the mesh file that a URDF in `folder` names by a path, ``file://`` or ``package://``; None if it is missing.
 
-    A package is searched for in the folders above the URDF, then in the folders of ROS and of this Python installation.
+    The folders above the URDF are searched for a package, then the folders of ROS and of this Python installation.
     """
     scheme, separator, within = name.partition("://")
     within = within if separator else name
@@ -337,16 +337,16 @@ class Kind(StrEnum):
 
 
 _ADVICE = {
-    Kind.TASK: "brachis plan {path} --out out makes a result of it; its key robot.urdf names its URDF",
+    Kind.TASK: "brachis plan {path} --out out turns it into a result; its key robot.urdf names the URDF",
     Kind.SWEEP: "brachis sweep {path} plans it",
-    Kind.URDF: "brachis new {path} writes a task for it",
-    Kind.RESULT: "brachis verify, plot and bottleneck take it; it was planned from a task file, for a URDF",
+    Kind.URDF: "brachis new {path} writes a task for this robot",
+    Kind.RESULT: "brachis verify, plot and bottleneck accept it; the motion was planned from a task file, for a URDF",
     Kind.FIGURES: "The motion itself is in the npz file in the same folder",
 }
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind | None:
-    """Recognise a file by its beginning; None if it cannot be read or is something else."""
+    """Recognise the kind of a file by its beginning; None if the file cannot be read or is of an unknown kind."""
     try:
         content = read_file(path, 4 * LARGEST_TEXT, beginning=16_384)
     except OSError:
@@ -374,25 +374,25 @@ def is_task_file(path: str | os.PathLike[str]) -> bool:
 def check_kind(
     path: str | os.PathLike[str], expected: str, error: type[InputError]
 ) -> None:
-    """Refuse a file that is recognised as a different kind than expected. Unknown kinds are left to the reader.
+    """Reject a file that is recognised as a different kind than expected. A file of an unknown kind is accepted.
 
     Parameters
     ----------
     path : path
     expected : str
-        A `Kind`, or words for a kind that cannot be recognised.
+        A `Kind`, or the name of a kind that cannot be recognised.
     error : type
-        Class of the error.
+        Class of the error to raise.
 
     Raises
     ------
     InputError
-        Of the class `error`.
+        The file is of a different kind; the error is of the class `error`.
     """
     kind = kind_of(path)
     if kind not in (None, expected):
         raise error(
-            "the file is of another kind",
+            "the file is of a different kind",
             where=os.fspath(path),
             found=kind,
             allowed=expected,
@@ -415,24 +415,24 @@ def read_text(
     Parameters
     ----------
     path : Path
-        The file.
+        Path of the file to read.
     where : str
-        Place that messages name: the file itself, or the key that names it.
+        Place shown in messages: the file itself, or the key of the task that names the file.
     folder : Path, optional
-        Folder of relative paths, for the message about a missing file.
+        Folder to which paths are relative, for the message about a missing file.
     found : str, optional
-        Name of the file, for messages whose place is a key.
+        Name of the file, for messages in which `where` is a key.
     largest : int, optional
-        Largest size, bytes; longer files are refused.
+        Maximum size, bytes; longer files are rejected.
     hint : str, optional
-        Advice if the file is too long; without `folder` also if it is missing.
+        Advice if the file is too long or, without `folder`, if it is missing.
     error : type, optional
-        Class of the error.
+        Class of the error to raise.
 
     Raises
     ------
     InputError
-        Of the class `error`: the file is missing, is not a text file, is too long, or cannot be read.
+        An error of the class `error`: the file is missing, is not a text file, is too long, or cannot be read.
     """
     try:
         content = read_file(path, largest).decode()

@@ -1,8 +1,8 @@
 """Handling of Ctrl-C that never loses a press.
 
-Python raises KeyboardInterrupt wherever the program happens to be. The import of a compiled library may swallow it, or
-turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every press
-(`SigintHandler`), and checks between its stages whether a press was missed.
+Python raises KeyboardInterrupt wherever the program happens to be. The import of a compiled library may swallow this
+exception or turn it into an ImportError; a finaliser may only print it. The command line therefore remembers every
+press (`SigintHandler`), and checks between its stages whether a press was missed.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ INTERRUPTED = 130
 
 
 class SigintHandler:
-    """A handler of SIGINT that remembers a press until it takes effect. A second press ends the program at once.
+    """A handler of SIGINT that remembers a press of Ctrl-C until it takes effect; a second press ends the program.
 
     Attributes
     ----------
     pending : bool
-        Whether a press has not taken effect yet.
+        Whether a press of Ctrl-C has not taken effect yet.
     raising : bool
         Whether a press also raises KeyboardInterrupt.
     """
 
     heard: ClassVar[int] = 0
-    """Number of presses that ended something early."""
+    """Number of presses that have interrupted something."""
     pending = False
     raising = False
 
@@ -55,13 +55,13 @@ class SigintHandler:
 
 
 def install() -> None:
-    """Remember presses from now on. If SIGINT is ignored, it stays ignored."""
+    """Remember presses of Ctrl-C from now on. If SIGINT is ignored, it stays ignored."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, SigintHandler())
         hook = sys.unraisablehook
 
         def quiet(unraisable: UnraisableHookArgs) -> None:
-            """Pass on everything except a KeyboardInterrupt in a finaliser: that press is remembered."""
+            """Pass on every exception except a KeyboardInterrupt in a finaliser, whose press is remembered instead."""
             if not issubclass(unraisable.exc_type, KeyboardInterrupt):
                 hook(unraisable)
 
@@ -69,7 +69,7 @@ def install() -> None:
 
 
 def sigint_handler() -> SigintHandler:
-    """Return the handler that remembers presses; a new one if it is not installed, as inside another program."""
+    """Return the installed handler that remembers presses; without one, as inside another program, return a new one."""
     handler = signal.getsignal(signal.SIGINT)
     return handler if isinstance(handler, SigintHandler) else SigintHandler()
 
@@ -93,7 +93,7 @@ def ignore() -> None:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Let presses interrupt the program within this block, including a press before it.
+    """Let a press of Ctrl-C interrupt the program within this block, including a press before the block.
 
     If a press is swallowed within the block, the block ends with KeyboardInterrupt, whatever else happened.
     """
@@ -109,7 +109,7 @@ def interruptible() -> Iterator[None]:
 
 @contextlib.contextmanager
 def end_on_interrupt() -> Iterator[None]:
-    """Let a press end this block, and nothing else. The block is meant to be ended so."""
+    """Let a press of Ctrl-C end this block but not the program; this is the intended way to end the block."""
     try:
         yield
     except KeyboardInterrupt:
@@ -118,9 +118,10 @@ def end_on_interrupt() -> Iterator[None]:
 
 @contextlib.contextmanager
 def defer() -> Iterator[None]:
-    """Defer a press to the end of this block, where KeyboardInterrupt is raised.
+    """Defer a press of Ctrl-C to the end of this block, where KeyboardInterrupt is raised.
 
-    For code that must not be interrupted, or might swallow a press: imports of compiled libraries, finalisers.
+    Use this function for code that must not be interrupted or might swallow a press: imports of compiled libraries,
+    finalisers.
     """
     before = signal.getsignal(signal.SIGINT)
     in_main_thread = threading.current_thread() is threading.main_thread()
@@ -147,9 +148,9 @@ def defer() -> Iterator[None]:
 
 @contextlib.contextmanager
 def block_in_children() -> Iterator[None]:
-    """Let processes started within this block ignore Ctrl-C; this process handles a press at the end of the block."""
+    """Make processes started within this block ignore Ctrl-C; this process handles a press at the end of the block."""
     with defer():
-        # New processes inherit the mask.
+        # New processes inherit the mask of blocked signals.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield

@@ -1,4 +1,4 @@
-"""Names of the figures of a robot or a task, in tables, sentences and files."""
+"""Names of the limited quantities of a robot or a task, for tables, sentences and files."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ class Label:
     key : str
         Key of the task that sets the figure; empty without a key.
     active_text, slack_text : str
-        Text for "the limit is active", and for the slack that a wider bound provides. By default both are composed of
-        subject and kind.
+        Text for "the limit is active", and for the slack that a wider bound provides. By default, each text is composed
+        of `subject` and `kind`.
     share : str
-        Title of an axis for the ratio to the bound. Default: ``<kind> / limit``, for example ``torque / limit``.
+        Title of a plot axis that shows the ratio to the bound. Default: ``<kind> / limit``, for example ``torque /
+        limit``.
     cause : str
-        The setting that the user would change, for example ``feed rate``, if several values share one figure; empty if
-        each value has its own figure.
+        The setting that the user would change, for example ``feed rate``, if one setting limits several values; empty
+        if each value has its own setting.
     """
 
     subject: str
@@ -40,12 +41,12 @@ class Label:
 
     @property
     def after(self) -> str:
-        """The unit, as text after a figure."""
+        """The unit, as text to append to a figure."""
         return "" if self.unit == "-" else f" {self.unit}"
 
     @property
     def axis(self) -> str:
-        """Title of an axis for the ratios."""
+        """Title of a plot axis that shows ratios to the bound."""
         return self.share or f"{self.kind} / limit"
 
     def __str__(self) -> str:

@@ -11,15 +11,15 @@ from contextlib import contextmanager
 from typing import Any
 
 Listener = Callable[[str], None]
-"""Receives the planner's present step in plain words, between iterations; may raise KeyboardInterrupt."""
+"""Function that receives the planner's current step, in plain words; it may raise KeyboardInterrupt."""
 
 
 def ignore(_text: str) -> None:
-    """Ignore a report."""
+    """Ignore a report of progress."""
 
 
 class Iteration(str):
-    """A report of a step within a stage, which is logged at level DEBUG; stages are logged at INFO."""
+    """A report of an iteration within a stage. Iterations are logged at level DEBUG, stages at INFO."""
 
     __slots__ = ()
 
@@ -28,13 +28,13 @@ class Iteration(str):
 def report_progress(
     listener: Listener | None, progress: bool | None
 ) -> Iterator[Listener]:
-    """Provide a listener that logs every step, passes it on to another listener, and shows it.
+    """Provide a listener that logs every step, passes it on to another listener, and shows it to the user.
 
     Parameters
     ----------
     listener : callable or None
     progress : bool or None
-        Whether steps are shown. None: they are shown in notebooks, unless there is a listener.
+        Whether steps are shown. With None, they are shown in notebooks unless there is a listener.
     """
     if progress is None:
         progress = listener is None and _in_notebook()
@@ -42,7 +42,7 @@ def report_progress(
     log = logging.getLogger("brachis")
 
     def report(text: str) -> None:
-        """Log a step, pass it on and show it."""
+        """Log a step, pass it on to the listener, and show it."""
         level = logging.DEBUG if isinstance(text, Iteration) else logging.INFO
         log.log(level, "%s", text)
         if listener is not None:
@@ -57,7 +57,7 @@ def report_progress(
 
 
 class _Line:
-    """A line that shows the present step, below the cell of a notebook or on standard error.
+    """A line that shows the current step, below the cell of a notebook or on standard error.
 
     If standard error is not a terminal, every stage is written on a separate line.
     """

@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 from brachis.errors import MissingAttributeError
 
 COLUMNS = 100
-"""Largest length of a summary on one line, characters."""
+"""Maximum length of a summary that is shown on one line, characters."""
 LINES = 22
-"""Largest number of entries of a summary: with name and prompt they fit into a terminal of 24 lines."""
+"""Maximum number of entries in a summary: with the name and the prompt, they fit into a terminal of 24 lines."""
 
 
 class Summary:
     """Base class of objects that show a summary: the entries of `summary`, by default the fields of a dataclass."""
 
     def summary(self) -> Mapping[str, object]:
-        """Return the entries that are shown, by name."""
+        """Return the entries shown in the summary, by name."""
         names = [entry.name for entry in fields(self) if entry.repr]  # type: ignore[arg-type]
         return {name: getattr(self, name) for name in names}
 
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Refuse an attribute that does not exist, and suggest a similar one."""
-            if hasattr(type(self), name):  # a property that failed
+            """Raise an error for an attribute that does not exist, and suggest a similar one."""
+            if hasattr(type(self), name):  # the attribute is a property that failed
                 return object.__getattribute__(self, name)
             raise MissingAttributeError(self, name)
 

@@ -1,4 +1,4 @@
-"""Numbers and names in sentences."""
+"""Functions that write numbers and names in sentences."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def write_apart(value: float, *references: float, digits: int = 4) -> tuple[str, ...]:
-    """Write a number and others with enough significant digits to distinguish it from them, at least `digits`."""
+    """Write numbers with enough significant digits, at least `digits`, to tell the first one from the others."""
     for count in range(digits, 18):
         text, *texts = (f"{number:.{count}g}" for number in (value, *references))
         if all(
@@ -23,6 +23,6 @@ def write_count(count: int, noun: str) -> str:
 
 
 def name_first(names: Sequence[str], separator: str, count: int = 3) -> str:
-    """Join the first names, followed by the number of further names."""
+    """Join the first `count` names, followed by the number of further names."""
     ending = f" and {len(names) - count} more" if len(names) > count else ""
     return separator.join(names[:count]) + ending

@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics: the protocol, the families, and the registry that finds a family by geometry.
+"""Closed-form inverse kinematics: the protocol, the families, and the registry that finds a family for a geometry.
 
 Examples
 --------
@@ -49,4 +49,4 @@ __all__ = [
     "ik_family",
     "missing_eaik",
 ]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # what tab completion shows

@@ -1,8 +1,8 @@
-"""The joints for which a closed form solves: the relations of their axes, and the points that they place.
+"""The joints for which a closed form solves: the relations between their axes, and the points that they place.
 
-The motion of two neighbouring joints does not change the relation of their axes (parallel, meeting, perpendicular).
-Redundant joints between them may change it. A relation is therefore accepted if it holds at several random positions of
-the redundant joints; the closed forms then take it as exact.
+The motion of two neighbouring joints does not change how their axes are related (parallel, meeting, perpendicular).
+Redundant joints between them may change this relation. A relation is therefore accepted only if it holds at several
+random positions of the redundant joints; the closed forms then treat the relation as exact.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class RemainingJoints:
     ----------
     names : tuple of str
     joints : tuple of int
-        Their indices in the chain.
+        Indices of these joints in the chain.
     revolute : (J,) bool ndarray
     axes, points : (3, J, S) ndarray
         As in `PosedScrews`, with these joints at zero.
@@ -70,7 +70,7 @@ class RemainingJoints:
     def of(
         cls, geometry: ChainGeometry, redundant: tuple[int, ...], count: int
     ) -> RemainingJoints:
-        """Hold the redundant joints at random positions.
+        """Return the remaining joints, with the redundant joints at random positions.
 
         Raises
         ------
@@ -96,15 +96,15 @@ class RemainingJoints:
     def of_pose(
         cls, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
     ) -> RemainingJoints:
-        """Return the six remaining joints for a pose; raises NotApplicableError for other tasks or counts."""
+        """Return the six remaining joints for a pose; raise NotApplicableError for a different task space or count."""
         if not isinstance(task_map, Pose):
-            raise NotApplicableError("this family solves only poses")
+            raise NotApplicableError("this family solves only for poses")
         return cls.of(geometry, redundant, 6)
 
     def reverse(self) -> RemainingJoints:
         """List the same joints in the reverse order, as seen from the tool, with reversed axes.
 
-        Their positions do not change.
+        The joint positions do not change.
         """
         return replace(
             self,
@@ -144,7 +144,7 @@ class RemainingJoints:
         return float(np.sqrt(dot(gaps, gaps).max()))
 
     def meeting(self, *places: int) -> Anchor | None:
-        """Return the point in which axes of joints always meet; None without one, or if it moves along all of them.
+        """Return the point where axes of joints always meet; None if there is none, or if it moves along all axes.
 
         If two axes coincide, it is any point on them.
         """
@@ -161,7 +161,7 @@ class RemainingJoints:
         return None
 
     def _nearest(self, i: int, j: int) -> np.ndarray:
-        """Return the point, (3, S), on the axis of i that is closest to that of j; any point if they are parallel."""
+        """Return the point, (3, S), on the axis of i closest to the axis of j; any point if the axes are parallel."""
         first = self.axes[:, i]
         second = self.axes[:, j]
         normal = cross(first, second)
@@ -179,13 +179,13 @@ class Arm:
     Attributes
     ----------
     screws : tuple of Screw
-        Joints a, b, c, which place a point; then the joints u, v, w of the wrist that turns about it, if there is one.
-        For three parallel axes, all joints in their order.
+        Joints a, b, c, which place a point; then the joints u, v, w of a wrist that turns about this point, if there is
+        one. For three parallel axes, all joints in their order.
     centre : (3, ...) ndarray
-        This point, m: the centre of the wrist, or the tool; or a point that the joints after the parallel axes do not
-        move.
+        The point that is placed, m: the centre of the wrist, the tool, or a point that the joints after the parallel
+        axes do not move.
     meeting : (3, ...) ndarray
-        Point where the axes of two of a, b, c meet, m; equal to `centre` if it is not used.
+        Point where the axes of two of the joints a, b, c meet, m; equal to `centre` if it is not used.
     """
 
     screws: tuple[Screw, ...]

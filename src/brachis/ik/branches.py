@@ -1,16 +1,17 @@
 """Closed forms whose branches are distinguished by det J_nr: by its factors, or by its sign alone.
 
-Two solutions meet only where det J_nr vanishes. So the branches follow from its sign, and det J_nr divided by its
-largest magnitude is the branch margin. Some families have several solutions with the same sign. Along a motion, these
-are distinguished by continuity.
+Two solutions meet only where det J_nr vanishes. The sign of det J_nr therefore defines the branches, and det J_nr
+divided by its largest magnitude is the branch margin. In some families, several solutions have the same sign. Along a
+motion, these solutions are distinguished by continuity.
 
-If a closed form solves for one joint after the other, det J_nr has factors. Each step brings a component or a distance
-of a position to a given value. The derivative of this condition with respect to the joint of the step is a factor, up
-to the sign. The two solutions of a step differ by the sign of its factor, and meet where it vanishes. The factors
-divided by their largest magnitudes are the branch margins, so a branch ends exactly where J_nr is singular.
+If a closed form solves for one joint after the other, det J_nr is a product of factors. Each step brings a component or
+a distance of a position to a given value. The derivative of this condition with respect to the joint of the step is, up
+to its sign, a factor. The two solutions of a step differ by the sign of the step's factor, and meet where this factor
+vanishes. The factors divided by their largest magnitudes are the branch margins, so a branch ends exactly where J_nr is
+singular.
 
-A step in which all joints are prismatic has one solution. If the sign of its factor changes with the redundant joints,
-``left`` and ``right`` are two branches, of which only one exists at a time.
+A step in which all joints are prismatic has only one solution. If the sign of its factor changes with the redundant
+joints, ``left`` and ``right`` are two branches, of which only one exists at a time.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class DeterminantSolver(FormulaMargins):
     chain : ChainGeometry
     redundant : sequence of int
     name : str
-        Beginning of the labels.
+        Beginning of the branch labels.
     postures : (K, n) ndarray, optional
         Random postures in which the scale of the determinant is measured.
     """
@@ -105,8 +106,8 @@ class Factor:
     labels : tuple of str
         Parts of the branch labels for a positive and a negative factor.
     slides : tuple of int
-        If all of these joints are prismatic, the step has one solution, and the factor depends on the redundant joints
-        alone.
+        Joints of the step. If all of them are prismatic, the step has one solution, and the factor depends only on the
+        redundant joints.
     """
 
     value: Callable[[Arm], np.ndarray]
@@ -115,23 +116,23 @@ class Factor:
 
 
 Steps = tuple[Arm, Sequence[np.ndarray]]
-"""The arm with its joints at zero, and the solutions for the joints, with the slots before the samples.
+"""The arm with its joints at zero, and the solutions for the joints, whose arrays have the slots before the samples.
 
 If the direction of a slide depends on joints that were solved before, the arm has this direction.
 """
 
 
 class FactoredSolver(FormulaSolver):
-    """Closed form that solves for one joint after the other. Each step has an axis of the solutions, its slot.
+    """Closed form that solves for one joint after the other. Each step has its own axis, or slot, in the solutions.
 
     Parameters
     ----------
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints
-        In the order in which they are solved for.
+        The joints, in the order in which the solver solves for them.
     factors : tuple of Factor
-        The factors of the steps.
+        Factors of det J_nr, one for each step.
     """
 
     def __init__(
@@ -248,13 +249,13 @@ def fit(
     joints: RemainingJoints,
     *arguments: object,
 ) -> S:
-    """Create a solver for joints in their order or, if it does not fit, in the reverse order.
+    """Create a solver for joints in their order or, if the solver does not fit, in the reverse order.
 
     Parameters
     ----------
     solver : type
-        It is made from the geometry, the redundant joints, the remaining joints in one order, and the further
-        arguments. It raises `NotApplicableError` if it does not fit.
+        Class of the solver, called with the geometry, the redundant joints, the remaining joints in one order, and the
+        further arguments. The class raises `NotApplicableError` if the solver does not fit.
     geometry : ChainGeometry
     redundant : tuple of int
     joints : RemainingJoints

@@ -1,23 +1,24 @@
 """Poses of six revolute joints of which some axes are parallel or meet: EAIK's decomposition into subproblems.
 
-Redundant joints may be anywhere in the chain. Those before the first and after the last of the six (a rail, a
-turntable, the roll of the tool) only move the base or the tool. With their motions G_1 and G_2, and the placement M of
-the tool in the zero posture, the target T requires of the chain in between
+Redundant joints may be anywhere in the chain. Redundant joints before the first or after the last of the six (a rail, a
+turntable, the roll of the tool) only move the base or the tool. Let G_1 and G_2 be their motions, and M the placement
+of the tool in the zero posture. The target T then requires of the chain in between
 
     E_1(q_1) ... E_6(q_6) M = G_1^-1 T (G_2 M)^-1 M,
 
-where redundant joints between the six are held at their values. These values change the axes from sample to sample, and
-EAIK analyses every different value anew (about ten microseconds).
+where redundant joints between the six are held at their values. The held values change the axes from sample to sample,
+and EAIK has to analyse the arm anew for each different value (in about ten microseconds).
 
-A solution of EAIK is accepted only if it reaches the target: near misses are polished, wrong and repeated solutions are
-dropped. The order of EAIK's solutions changes along a path; here the sign of det J_nr is the branch. Both signs have
-equally many solutions: the map from postures to poses has degree zero, because some poses are out of reach.
+A solution of EAIK is accepted only if it reaches the target: near misses are polished, and wrong or repeated solutions
+are dropped. The order of EAIK's solutions changes along a path, so the sign of det J_nr defines the branch here. Both
+signs have the same number of solutions: the map from postures to poses has degree zero, because some poses are out of
+reach.
 
-EAIK's tolerance for parallel and meeting axes is close to rounding. A URDF that writes pi/2 with ten digits, or a
-product of a few rotations, already exceeds it; hence `exact_axes`. Held joints are removed from the chain here, and
-EAIK is called for one pose at a time. EAIK's own function for fixed joints crashes on a wrong index. Its batches run in
-threads, where an error ends the process, and are not faster. Only the compiled part of the package is loaded; the rest
-reads URDFs, which needs libraries for meshes.
+EAIK's tolerance for parallel and meeting axes is close to the rounding error. A URDF that writes pi/2 with ten digits,
+or a product of a few rotations, already exceeds this tolerance. Axes are therefore corrected by `exact_axes`. Held
+joints are removed from the chain here, and EAIK is called for one pose at a time. EAIK's own function for fixed joints
+crashes on a wrong index. EAIK's batches run in threads, where an error ends the process, and are not faster. Only the
+compiled part of the package is loaded; the rest reads URDFs and needs libraries for meshes.
 """
 
 from __future__ import annotations
@@ -41,13 +42,13 @@ from brachis.robot.task_map import Pose
 NOT_INSTALLED = "EAIK is not installed (pip install EAIK)"
 """Reason why EAIK is not used, if it is not installed."""
 EXACT_AXES = 1e-8
-"""Axes this close to parallel, or to meeting, are treated as such, rad or m."""
+"""Axes that are parallel (rad) or meet (m) to within this tolerance are treated as exactly so."""
 COARSE_AXES = 4e-5
-"""The same if EAIK fails on axes that are almost parallel; the solutions then need polishing."""
+"""Tolerance used instead if EAIK fails on axes that are almost parallel; the solutions then need polishing."""
 _AMPLIFIED = 1e3
 """Factor between the error of the axes and the allowed error of solutions."""
 _KEPT = 4096
-"""Largest number of EAIK's robots that are kept."""
+"""Maximum number of EAIK's robots in the cache."""
 _PER_SIGN = 8
 """Six revolute joints reach a pose in at most 16 ways, half of them with each sign of det J_nr."""
 
@@ -66,7 +67,7 @@ def _import_eaik() -> Any:
 
 
 class EaikSolver(DeterminantSolver):
-    """Closed form by EAIK; see the formulas of the module.
+    """Closed form by EAIK; see the formulas in the docstring of the module.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ class EaikSolver(DeterminantSolver):
         return _arrange(wrap(q[right][:, self._joints]), groups, len(q_r))
 
     def _targets_between(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Return the targets of the chain in between, G_1^-1 T (G_2 M)^-1 M; the placement of the tool is G M."""
+        """Return the targets of the chain between the outer redundant joints, G_1^-1 T (G_2 M)^-1 M."""
         poses = Poses.of_targets(targets)
         if self._before:
             undo = self._undo(self._before, q_r[:, : self._inner.start])
@@ -145,13 +146,13 @@ class EaikSolver(DeterminantSolver):
         return poses.targets()
 
     def _undo(self, joints: list[int], positions: np.ndarray) -> Poses:
-        """Return the inverse of the tool's placements with only these joints at positions, (K, h)."""
+        """Return the inverse tool placements with some joints at positions, (K, h), and the others at zero."""
         return Poses.of_tool(self._chain.screws_with(joints, positions)).inverse()
 
     def _judge(
         self, q: np.ndarray, expected: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the error of postures, in m or in an element of a rotation, and det J_nr; (N,) each."""
+        """Return the errors of postures, in m or as elements of rotation matrices, and det J_nr; (N,) each."""
         positions, rotations, twists = self._chain.tool(q, in_tool_axes=False)
         targets = np.concatenate([positions, rotations.reshape(-1, 9)], axis=1)
         columns = np.moveaxis(twists[:, :, self._joints], 0, 1)
@@ -213,7 +214,7 @@ class EaikSolver(DeterminantSolver):
         return [self._robots[key] for key in keys]
 
     def _make_robots(self, values: np.ndarray, tolerance: float) -> list[Any]:
-        """Create EAIK's robots for held values, (U, h); None without a decomposition."""
+        """Create EAIK's robots for held values, (U, h); None for values without a decomposition."""
         create = _import_eaik().Robot
         use_double_precision = True
         screws = self._chain.screws_with(self._held, values)
@@ -242,7 +243,7 @@ def _calculate(robot: Any, pose: np.ndarray) -> np.ndarray:
     """Return EAIK's solutions for one pose, (count, 6)."""
     try:
         joints = robot.calculate_IK(pose).Q if robot is not None else ()
-    except RuntimeError:  # one of its subproblems failed
+    except RuntimeError:  # one of EAIK's subproblems failed
         joints = ()
     return np.asarray(joints).reshape(-1, 6)
 
@@ -250,8 +251,8 @@ def _calculate(robot: Any, pose: np.ndarray) -> np.ndarray:
 def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     """Arrange solutions by samples and signs, without repetitions.
 
-    They are ordered by their angles, in cells of which a turn has so many that rounding seldom changes the order. The
-    order has no meaning; it only makes equal calls return equal results.
+    The solutions are ordered by their angles, rounded to coarse steps so that rounding errors seldom change the order.
+    The order has no meaning; it only makes equal calls return equal results.
 
     Parameters
     ----------
@@ -264,7 +265,7 @@ def _arrange(joints: np.ndarray, groups: np.ndarray, count: int) -> np.ndarray:
     Returns
     -------
     (count, 2, 8, 6) ndarray
-        Solutions, followed by NaN.
+        Solutions by sample and sign, followed by NaN.
     """
     marks = 0.5 + joints / TURN
     keys = np.zeros(len(joints), dtype=np.int64)
@@ -297,7 +298,7 @@ def _find_repetitions(marks: np.ndarray, groups: np.ndarray) -> np.ndarray:
 def exact_axes(
     axes: np.ndarray, points: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Make axes that are parallel, or that meet, to within a tolerance exactly parallel or meeting.
+    """Make axes that are parallel or meet to within a tolerance do so exactly.
 
     An axis that is parallel to an earlier one gets its direction. An axis that meets its predecessor is moved to the
     meeting point and is given by this point. A third axis that meets them there is given by the same point.
@@ -309,7 +310,7 @@ def exact_axes(
     points : (3, c, U) ndarray
         A point on each axis, m.
     tolerance : float
-        rad for directions, m for points.
+        Tolerance, rad for directions and m for points.
 
     Returns
     -------
@@ -323,7 +324,7 @@ def exact_axes(
 
 
 def _let_meet(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return points, (3, c, U), where axes meet their predecessors, else those closest to the predecessors' points."""
+    """Return points, (3, c, U), where axes meet their predecessors, or else the points closest to the predecessors'."""
     points = points.copy()
     normal = cross(axes[:, :-1], axes[:, 1:])
     size = dot(normal, normal)
@@ -352,9 +353,9 @@ def _let_meet(axes: np.ndarray, points: np.ndarray, tolerance: float) -> np.ndar
 def eaik(
     geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
 ) -> EaikSolver:
-    """Fit the family: a pose is prescribed, and six revolute joints remain, for which EAIK can solve."""
+    """Fit the family: a pose is prescribed, and six revolute joints remain for which EAIK can solve."""
     if not isinstance(task_map, Pose):
-        raise NotApplicableError("this family solves only poses")
+        raise NotApplicableError("this family solves only for poses")
     non_redundant = complement(geometry.n, redundant)
     sliding = [
         geometry.joint_names[i] for i in non_redundant if not geometry.revolute[i]

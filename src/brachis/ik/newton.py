@@ -1,11 +1,12 @@
-"""Newton's method for postures that meet a target, with linear conditions on the joints for uniqueness.
+"""Newton's method for postures that reach a target, with linear conditions on the joints that make the posture unique.
 
     f(q) = z,  C q = c:        [J; C] dq = (z - f(q), c - C q)
 
-for a batch of K postures at once, in the kernel.
+These equations are solved for a batch of K postures at once, in the kernel.
 
-If only a solution next to the given posture is accepted, each step must be at most half the previous one: then the
-method converges there. P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural monotonicity test).
+If only a solution next to the given posture is accepted, each step must be at most half the previous one. The method
+then converges to such a solution; see P. Deuflhard, Newton methods for nonlinear problems, Springer 2004 (natural
+monotonicity test).
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Newton:
     ----------
     task_map : TaskMap
     geometry : ChainGeometry, optional
-        A different chain than that of the task map's robot.
+        Chain to use instead of that of the task map's robot.
 
     Attributes
     ----------
@@ -62,22 +63,23 @@ class Newton:
         Parameters
         ----------
         targets : (K, c) ndarray
-            Task coordinates z.
+            Task coordinates z to reach.
         q : (K, n) ndarray
-            Postures where the search begins.
+            Postures from which the search begins.
         rows : (K, r, n) ndarray
-            C; with r = n - m.
+            Matrices C of the linear conditions; r = n - m.
         levels : (K, r) ndarray
-            c.
+            Right-hand sides c of the linear conditions.
         beside : bool, optional
-            Accept only postures next to the given ones: steps are fewer and shorter, and a posture is given up as soon
-            as a step is too long or is not at most half the previous one. If the magnitude of the posture is above 1,
-            lengths are relative to it.
+            Accept only postures next to the given ones. Steps are then fewer and shorter, and a posture is abandoned as
+            soon as a step is too long or is more than half the previous one. If the magnitude of the posture is above
+            1, the lengths of steps are relative to it.
 
         Returns
         -------
         (K, n) ndarray
-            Postures, with angles in the turns that the search reaches; NaN if it does not converge.
+            Postures found, in which angles may differ by whole turns from those given; NaN if the search does not
+            converge.
         """
         return find_postures(
             self._chain,
@@ -91,14 +93,14 @@ class Newton:
     def polish(
         self, targets: np.ndarray, q: np.ndarray, held: Sequence[int]
     ) -> np.ndarray:
-        """Refine postures that almost meet targets, (K, c), with some joints held; return (K, n), NaN on failure."""
+        """Refine postures that almost reach targets, (K, c), with some joints held; return (K, n), NaN on failure."""
         rows = np.broadcast_to(
             np.eye(q.shape[1])[held], (len(q), len(held), q.shape[1])
         )
         return self.solve(targets, q, rows, q[:, held], beside=True)
 
     def nearest(self, targets: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Find postures, (K, n), that meet targets, (K, c), without self-motion from given ones; NaN on failure."""
+        """Find postures, (K, n), that reach targets, (K, c), from given ones without self-motion; NaN on failure."""
         rows = np.swapaxes(self.self_motions(q), 1, 2) / self.scales
         return self.solve(targets, q, rows, apply_each(rows, q))
 

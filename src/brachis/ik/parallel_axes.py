@@ -1,4 +1,4 @@
-"""Six joints of which three successive ones have parallel axes: UR arms and similar arms, also on a rail.
+"""Six joints, three successive ones with parallel axes: UR arms and similar arms, on a fixed base or a rail.
 
 The equation of the joints is E_1 ... E_6 = D (`FactoredSolver`). The parallel axes b, c, d have the direction n.
 Without the joints before and after them, D leaves a planar motion G about n, which preserves n and distances along n:
@@ -21,8 +21,9 @@ Here p slides along s, and R with the letter of a joint is its rotation. In all 
     theta    turns e to R_G e about n,                  G D0 = G P + R_n(theta) (D0 - P)
     elbow    |E_c D0 - B| = |G D0 - B|   for c (2),     b turns E_c D0 to G D0
 
-with B, D0 on the axes b, d, and w in place of e if e is missing; d follows from theta. If the last joints of a chain
-have the structure of the first ones above, it is solved in the reverse order, E_6^-1 ... E_1^-1 = D^-1.
+Here B and D0 are points on the axes b and d. If e is missing, w takes its place. The angle of d follows from theta. If
+the last joints of a chain have the structure shown above for the first joints, the chain is solved in the reverse
+order, E_6^-1 ... E_1^-1 = D^-1.
 
 Branches are distinguished by the signs of these factors, whose product is det J_nr:
 
@@ -30,9 +31,9 @@ Branches are distinguished by the signs of these factors, whose product is det J
     elbow     up, down       (D0 - B) . (c x (D0 - C))
     wrist     noflip, flip   (e x f) . n,  with one joint after the parallel ones (a x w) . n
 
-all in the posture; the first word belongs to the positive sign. Each factor is, up to its sign, the derivative of the
-left side of the equation with two solutions. So the solution at which it rises and the one at which it falls are the
-two branches.
+all evaluated in the posture; the first word belongs to the positive sign. Each factor is, up to its sign, the
+derivative of the left side of the equation with two solutions. The left side rises at one solution and falls at the
+other; these two solutions are the two branches.
 
 The case without a rail is in K. P. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms",
 2013, and in A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022,
@@ -66,7 +67,7 @@ _SHOULDER = 0
 
 
 class ParallelAxesSolver(FactoredSolver):
-    """Closed form around three parallel axes; see the formulas of the module.
+    """Closed form around three parallel axes; see the formulas in the docstring of the module.
 
     Parameters
     ----------
@@ -127,12 +128,12 @@ class ParallelAxesSolver(FactoredSolver):
         return dot(arm.screws[self._first].axis, velocity)
 
     def _elbow_factor(self, arm: Arm) -> np.ndarray:
-        """Return the velocity of the axis of d away from that of b that c causes, times the distance."""
+        """Return the velocity, caused by c, of the axis of d away from the axis of b, times their distance."""
         b, c, d = (arm.screws[place] for place in self._parallel)
         return dot(d.point - b.point, c.velocity(d.point))
 
     def _wrist_factor(self, arm: Arm) -> np.ndarray:
-        """Return the volume spanned by two axes and n."""
+        """Return the volume spanned by the axes of two joints and n."""
         normal = cross(arm.screws[self._beside].axis, arm.screws[5].axis)
         return dot(normal, arm.screws[self._first].axis)
 
@@ -152,7 +153,7 @@ class ParallelAxesSolver(FactoredSolver):
         theta = angle_about(n, following, rotate(a.axis, -angle, image))
         if self._slide is not None:
             s = screws[self._slide].axis
-            if self._slide < self._turn:  # a also turns its direction
+            if self._slide < self._turn:  # the joint a also turns this direction
                 s = rotate(a.axis, -angle, s)
                 turned = list(screws)
                 turned[self._slide] = replace(screws[self._slide], axis=s)
@@ -197,7 +198,7 @@ class ParallelAxesSolver(FactoredSolver):
 
 
 def _fits(six: RemainingJoints, first: int) -> bool:
-    """Tell whether three joints from index `first` on are parallel, and the joints around them fit."""
+    """Tell whether the axes of three joints from index `first` on are parallel, and the joints around them fit."""
     if not six.revolute[first:].all():
         return False
     if not six.are_parallel(first, first + 1, first + 2):

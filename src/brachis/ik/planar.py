@@ -1,4 +1,4 @@
-"""Rows of positions, and an angle: chains that move in one plane and along its normal; and prismatic joints only.
+"""Positions, with or without an angle, for chains that move in one plane and along its normal, or only slide.
 
 For planar chains, the closed form solves for one or two joints of any kind, or three if an angle is prescribed, and for
 a slide along the normal if the height is prescribed. The height of the tool is its height at zero plus the slides along
@@ -8,7 +8,8 @@ the normal. With the redundant joints held, W0 is the tool with the others at ze
     two joints    E_a E_b W0 = W:                                            `move_within_plane`
     an angle      E_a E_b E_c = D, where D turns by the rest of the angle, and moves W0 to W
 
-With an angle, one revolute joint does not move a point P of its axis, and follows from the angle. Two joints remain:
+With an angle, one revolute joint follows from the angle. This joint does not move a point P on its axis. Two joints
+remain:
 
     c revolute    E_a E_b P = D P
     a revolute    E_c^-1 E_b^-1 P = D^-1 P
@@ -47,11 +48,11 @@ _LABELS = {
     "R": "swing",
     "P": "slide",
 }
-"""Names of branches by the kinds of the joints that remain after one joint follows from the angle."""
+"""Names of branches, by the kinds of the joints that remain once the joint that sets the angle is known."""
 
 
 class PlanarSolver(DeterminantSolver, FormulaSolver):
-    """Closed form of a planar chain; see the formulas of the module.
+    """Closed form of a planar chain; see the formulas in the docstring of the module.
 
     Parameters
     ----------
@@ -59,9 +60,9 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
     task_map : TaskMap
     redundant : tuple of int
     basis : (2, 3) ndarray
-        Of the plane.
+        Orthonormal basis of the plane.
     lifting : list of int
-        The joint that slides along the normal and is not redundant, if there is one.
+        The non-redundant joint that slides along the normal; empty if there is none.
     """
 
     def __init__(
@@ -91,7 +92,8 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
             self._angle = task_map
             self._angle_sense = np.sign(self._normal[task_map.world_axis])
             kinds = "".join(kinds.rsplit("R", 1))
-        # Heights above the plane are set to zero, and the part of the rows due to the tool's height is subtracted.
+        # Heights above the plane are set to zero, and the contribution of the tool's height is subtracted from the
+        # rows.
         self._height = self._normal @ geometry.tool_position
         self._offset = self._rows @ self._normal * self._height
         self._lift = basis.T @ np.linalg.pinv(self._rows @ basis.T)
@@ -171,7 +173,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
         return values
 
     def _arrange(self, values: Sequence[np.ndarray], q_r: np.ndarray) -> np.ndarray:
-        """Arrange solutions, m of (R, K): two are in the order of branches, one belongs to its determinant's sign."""
+        """Arrange m arrays of solutions, (R, K): two are in branch order; a single one has the branch of its sign."""
         answers = np.stack(values, axis=2) * self._senses[self._joints]
         revolute = self._chain.revolute[self._joints]
         answers[..., revolute] = wrap(answers[..., revolute])
@@ -185,7 +187,7 @@ class PlanarSolver(DeterminantSolver, FormulaSolver):
 
 
 def _plane_normal(geometry: ChainGeometry) -> np.ndarray:
-    """Return the direction to which revolute axes are parallel, and slides parallel or perpendicular."""
+    """Return the direction to which all revolute axes are parallel, and all slides parallel or perpendicular."""
     turning = np.flatnonzero(geometry.revolute)
     if not len(turning):
         raise NotApplicableError("no joint is revolute")
@@ -220,7 +222,7 @@ def planar(
 ) -> PlanarSolver:
     """Fit the family: all joints move in one plane, which the prescribed rows determine."""
     if len(task_map.angles) > 1:
-        raise NotApplicableError("this family does not solve orientations")
+        raise NotApplicableError("this family does not solve for orientations")
     normal = _plane_normal(geometry)
     rows = np.eye(3)[list(task_map.axes)]
     non_redundant = complement(geometry.n, redundant)
@@ -232,7 +234,7 @@ def planar(
     if len(lifting) != is_height.sum():
         row = task_map.rows[int(np.argmax(is_height))]
         raise NotApplicableError(
-            f"{row} needs one slide along it, no more and no less, that is not redundant"
+            f"{row} needs exactly one non-redundant slide along it"
         )
     rows = rows[~is_height]
     basis = _basis(normal, rows)
@@ -247,7 +249,7 @@ def planar(
         axis = np.eye(3)[task_map.world_axis]
         if np.linalg.norm(np.cross(normal, axis)) > tolerances.ANGLE:
             raise NotApplicableError(
-                f"{task_map.rows[-1]} turns in another plane than the joints"
+                f"{task_map.rows[-1]} turns in a different plane than the joints"
             )
         if len(rows) != 2:
             raise NotApplicableError("an angle needs both rows of the plane")
@@ -257,7 +259,7 @@ def planar(
 
 
 class PrismaticSolver(DeterminantSolver, FormulaSolver):
-    """Linear solver for prismatic non-redundant joints; see the formula of the module."""
+    """Linear solver for prismatic non-redundant joints; see the formula in the docstring of the module."""
 
     def __init__(
         self, geometry: ChainGeometry, task_map: TaskMap, redundant: tuple[int, ...]
@@ -314,6 +316,6 @@ def prismatic(
     ]
     if turning:
         raise NotApplicableError(
-            f"all joints must be prismatic besides the redundant ones; revolute: {', '.join(turning)}"
+            f"all joints except the redundant ones must be prismatic; revolute: {', '.join(turning)}"
         )
     return PrismaticSolver(geometry, task_map, redundant)

@@ -1,8 +1,8 @@
 """Three joints a, b, c that move a point W0 to a target W: E_a E_b E_c W0 = W.
 
-Each recipe solves for one joint after the other. It needs a property of a, b, c that holds at all positions of the
-redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move, and B a point
-on the axis of b. Steps with two solutions are marked by *.
+Each recipe solves for one joint after the other. A recipe needs a property of a, b, c that holds at all positions of
+the redundant joints. S is the point where two axes meet, n the normal of the plane in which two joints move, and B a
+point on the axis of b. A * marks a step with two solutions.
 
     plane of b, c   * a: n . E_a^-1 W = n . W0 (one solution for a slide);  b and c within the plane
     plane of a, b   * c: n . E_c W0 = n . W (one solution for a slide);  a and b within the plane
@@ -12,9 +12,9 @@ on the axis of b. Steps with two solutions are marked by *.
                     then the slide a along the axis of b, to which that of c is perpendicular
 
 Within a plane, two revolute joints, or a revolute and a prismatic one, follow from a distance (*); two prismatic joints
-from a linear system. The solutions of a step that sets a component or a distance of a position are distinguished by the
-sign of the derivative of this condition (`screws`). The factors of a recipe are these derivatives, as functions of the
-posture. Up to the sign, their product is the determinant of the Jacobian of the centre.
+follow from a linear system. The solutions of a step that sets a component or a distance of a position are distinguished
+by the sign of the derivative of this condition (`screws`). The factors of a recipe are these derivatives, as functions
+of the posture. Up to its sign, the product of the factors is the determinant of the Jacobian of the centre.
 
 Labels follow the senses of the joint axes. Consider an industrial arm whose axes 1, 2, 3 are z, y, y, and whose first
 three joints place a point (the centre of the wrist, or the tool). The label is ``front`` if the point is on the side to
@@ -26,16 +26,16 @@ A. J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subprobl
 parallel or meet, beside a spherical wrist); M. Brandstoetter, A. Angerer, M. Hofbaur, "An analytical solution of the
 inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and a spherical wrist", 2014.
 
-The family `positioning` has three joints that move the tool to a position, whatever its orientation. All other joints
-are redundant.
+In the family `positioning`, three joints move the tool to a position, whatever its orientation. All other joints are
+redundant.
 
 With the redundant joints held, let W0 be the tool with the three joints a, b, c at zero. They move it to the target W,
 
     E_a E_b E_c W0 = W,
 
-by one of the recipes above. Redundant joints may be before, between and after them: they place the axes and W0, sample
-by sample. Seen from the tool, the equation is E_c^-1 E_b^-1 E_a^-1 W = W0: the order of the joints is reversed, and
-target and tool change places. It is used if a recipe only fits in this order.
+by one of the recipes above. Redundant joints may be before, between and after these three: they place the axes and W0,
+sample by sample. Seen from the tool, the equation is E_c^-1 E_b^-1 E_a^-1 W = W0: the order of the joints is reversed,
+and target and tool change places. This form is used if a recipe fits only in this order.
 
 Branches are distinguished by the signs of the two factors of the recipe.
 """
@@ -67,7 +67,7 @@ Values = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a first; b and c then act within their plane."""
+    """Solve for joint a first; b and c then act within their plane."""
     a, b, c = arm.base
     normal = plane_normal(b, c)
     orbit = a.inverse.orbit(target)
@@ -76,7 +76,7 @@ def solve_plane_of_last(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_plane_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c first; a and b then act within their plane."""
+    """Solve for joint c first; a and b then act within their plane."""
     a, b, c = arm.base
     normal = plane_normal(a, b)
     orbit = c.orbit(arm.centre)
@@ -85,7 +85,7 @@ def solve_plane_of_first(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for c first, from the distance to the point where a and b meet."""
+    """Solve for joint c first, from the distance to the point where the axes of a and b meet."""
     a, b, c = arm.base
     outer = c.orbit(arm.centre)
     away = target - arm.meeting
@@ -96,7 +96,7 @@ def solve_meeting_of_first(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for a first, from the distance to the point where b and c meet."""
+    """Solve for joint a first, from the distance to the point where the axes of b and c meet."""
     a, b, c = arm.base
     outer = a.inverse.orbit(target)
     away = arm.centre - arm.meeting
@@ -109,7 +109,7 @@ def solve_meeting_of_last(arm: Arm, target: np.ndarray) -> Values:
 
 
 def solve_cylinder(arm: Arm, target: np.ndarray) -> Values:
-    """Solve for the centre's distance in front of, or behind, the common direction of a and b; then for c."""
+    """Solve for the centre's distance in front of, or behind, the common direction of a and b; then for joint c."""
     a, b, c = arm.base
     front = cross(b.axis, c.axis)
     away = target - b.point
@@ -136,7 +136,7 @@ def move_within_plane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve for two joints that move `start` to `end` within their common plane.
 
-    The two solutions follow each other along the axis `slot`; two slides have only one.
+    The two solutions follow each other along the axis `slot`; for two slides, there is only one solution.
     """
     if first.revolute:
         orbit = second.orbit(start)
@@ -156,7 +156,7 @@ def move_within_plane(
 
 
 def _across(arm: Arm, joint: int, plane: tuple[int, int]) -> np.ndarray:
-    """Return the velocity of the centre normal to the plane of two other joints that a joint causes."""
+    """Return the velocity of the centre, caused by a joint, normal to the plane of two other joints."""
     normal = plane_normal(*(arm.screws[i] for i in plane))
     return dot(normal, arm.screws[joint].velocity(arm.centre))
 
@@ -164,7 +164,7 @@ def _across(arm: Arm, joint: int, plane: tuple[int, int]) -> np.ndarray:
 def _area(arm: Arm, plane: tuple[int, int]) -> np.ndarray:
     """Return the area spanned by the velocities of the centre due to two joints of one plane, up to its sign.
 
-    For two slides, it is the length of `plane_normal`, which already contains it.
+    For two slides, this area is the length of `plane_normal`.
     """
     first, second = (arm.screws[i] for i in plane)
     if first.revolute:
@@ -175,12 +175,12 @@ def _area(arm: Arm, plane: tuple[int, int]) -> np.ndarray:
 
 
 def _along(arm: Arm, joint: int, axis: int) -> np.ndarray:
-    """Return the velocity of the centre along the axis of another joint that a joint causes."""
+    """Return the velocity of the centre, caused by a joint, along the axis of another joint."""
     return dot(arm.screws[axis].axis, arm.screws[joint].velocity(arm.centre))
 
 
 def _approach(arm: Arm, joint: int, sign: float) -> np.ndarray:
-    """Return the velocity of the centre towards, or away from, the meeting point of two others, times the distance."""
+    """Return the velocity of the centre to or from the meeting point of two other axes, times the distance."""
     direction = sign * (arm.meeting - arm.centre)
     return dot(direction, arm.screws[joint].velocity(arm.centre))
 
@@ -192,7 +192,7 @@ def _in_front(arm: Arm) -> np.ndarray:
 
 
 def _to_front(arm: Arm) -> np.ndarray:
-    """Return the velocity of the centre to the front that c causes."""
+    """Return the velocity of the centre to the front, caused by joint c."""
     _, b, c = arm.base
     return dot(cross(b.axis, c.axis), c.velocity(arm.centre))
 
@@ -204,11 +204,11 @@ class Recipe:
     Attributes
     ----------
     fits : callable or None
-        Tells whether the recipe fits joints; None if axes must meet.
+        Function that tells whether the recipe fits joints; None if axes must meet.
     meets : tuple of int
-        Two joints whose axes must meet, in `Arm.meeting`; empty if no axes must meet.
+        Two joints whose axes must meet, in the point `Arm.meeting`; empty if no axes need to meet.
     solve : callable
-        Returns the positions of a, b, c from the screws at zero and the target of the centre.
+        Function that returns the positions of a, b, c from the screws at zero and the target of the centre.
     factors : tuple of Factor
         Factors of the slots `FRONT` and `UP`.
     """
@@ -288,7 +288,7 @@ RECIPES = (
 
 
 def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor | None]:
-    """Find the recipe by which the first three joints place a point; `point` is its name for messages.
+    """Find the recipe by which the first three joints place a point; `point` names this point in messages.
 
     Returns
     -------
@@ -314,7 +314,7 @@ def choose_recipe(point: str, joints: RemainingJoints) -> tuple[Recipe, Anchor |
 
 
 class PositioningSolver(FactoredSolver):
-    """Closed form of three joints for the position of the tool; see the formulas of the module.
+    """Closed form of three joints for the position of the tool; see the formulas in the docstring of the module.
 
     Parameters
     ----------
@@ -363,6 +363,6 @@ def positioning(
 ) -> PositioningSolver:
     """Fit the family: only the position of the tool is prescribed, and three joints remain."""
     if task_map.angles or len(task_map.axes) != 3:
-        raise NotApplicableError("this family solves only the position: x, y and z")
+        raise NotApplicableError("this family solves only for the position: x, y and z")
     three = RemainingJoints.of(geometry, redundant, 3)
     return fit(PositioningSolver, geometry, redundant, three, task_map.axes)

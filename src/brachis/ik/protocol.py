@@ -24,8 +24,8 @@ class IKSolver(ABC):
         Labels of the B branches, all different. A label names a geometric choice (the elbow on one side or the other).
         A continuous joint curve keeps its label until a branch margin reaches zero.
     alternatives : int
-        Largest number of solutions of a branch, A. No geometric choice distinguishes them; along a curve, they are
-        distinguished by continuity alone. Default: 1.
+        Maximum number of solutions in a branch, A. No geometric choice distinguishes these solutions; along a curve,
+        they are distinguished only by continuity. Default: 1.
     """
 
     branches: tuple[str, ...]
@@ -40,13 +40,13 @@ class IKSolver(ABC):
         targets : (K, c) ndarray
             Task coordinates; see `TaskMap` (for poses c = 12: position, then the rotation matrix row by row).
         q_r : (K, r) ndarray
-            Redundant joints, in chain order.
+            Positions of the redundant joints, in chain order.
 
         Returns
         -------
         (K, B, A, m) ndarray
-            Non-redundant joints, in chain order. Angles may be in any turn. NaN without a solution, and after the last
-            one.
+            Non-redundant joints, in chain order. Angles may include any number of whole turns. Entries without a
+            solution are NaN; in each branch, they come last.
         """
 
     def solve_branch(
@@ -59,14 +59,15 @@ class IKSolver(ABC):
     def branch_margins(self, q: np.ndarray, branch: int) -> np.ndarray:
         """Return smooth functions of the posture that are positive inside a branch and zero at its boundary.
 
-        They must be analytic and accept complex postures, because their derivatives are computed by complex steps.
+        The functions must be analytic and accept complex postures, because their derivatives are computed by complex
+        steps.
 
         Parameters
         ----------
         q : (K, n) ndarray
-            All joints; real or complex.
+            Positions of all joints; real or complex.
         branch : int
-            Index into `branches`.
+            Index of the branch in `branches`.
 
         Returns
         -------
@@ -77,19 +78,20 @@ class IKSolver(ABC):
     def branch_formula(self, branch: int, *counts: int) -> Formula | None:
         """Return the formula of `solve_branch`, for given numbers of task coordinates and redundant joints.
 
-        None except in a `FormulaSolver`; the planner then calls `solve_branch`.
+        The result is None except in a `FormulaSolver`; if it is None, the planner calls `solve_branch`.
         """
         return None
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
         """Return the formulas of the margins and their slopes in postures of n joints.
 
-        None except in `FormulaMargins`; the planner then calls `branch_margins` and `margin_gradient`.
+        The result is None except in `FormulaMargins`; if it is None, the planner calls `branch_margins` and
+        `margin_gradient`.
         """
         return None
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Differentiate the branch margins with respect to all joints, (K, k, n), exact by complex steps."""
+        """Differentiate the branch margins with respect to all joints, (K, k, n), exactly, by complex steps."""
         count, n = q.shape
         step = 1e-30
         stepped = np.repeat(q[None].astype(complex), n, axis=0)
@@ -101,8 +103,8 @@ class IKSolver(ABC):
 class FormulaMargins(IKSolver):
     """Closed form whose margins are formulas that the compiled library evaluates.
 
-    They are written with NumPy, and recorded when they are first needed. See `brachis.kernel.formula` for the allowed
-    operations.
+    The formulas are written with NumPy and are recorded when they are first needed. See `brachis.kernel.formula` for
+    the allowed operations.
     """
 
     @abstractmethod
@@ -132,7 +134,7 @@ class FormulaMargins(IKSolver):
         return self._formula(("slopes", n), Formula.gradient, self.margins, n)
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
-        """Return margins and slopes with the signs of a branch; None if a subclass computes one of them itself."""
+        """Return margins and slopes with the signs of a branch; None if a subclass computes either of them itself."""
         solver_type = type(self)
         if solver_type.branch_margins is not FormulaMargins.branch_margins:
             return None
@@ -147,16 +149,16 @@ class FormulaMargins(IKSolver):
         return self._values(q.shape[1])(q) * self.margin_signs(branch)
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:
-        """Evaluate the slopes of the margins."""
+        """Evaluate the slopes of the margins by their formula."""
         return self._slopes(q.shape[1])(q) * self.margin_signs(branch)[:, None]
 
 
 class FormulaSolver(FormulaMargins):
-    """Closed form whose solutions are formulas, too."""
+    """Closed form whose solutions, like its margins, are formulas."""
 
     @abstractmethod
     def answers(self, targets: np.ndarray, q_r: np.ndarray) -> np.ndarray:
-        """Compute the joints as in `solve`, (K, B, A, m); without a solution, one of them is not finite."""
+        """Compute the joints as in `solve`, (K, B, A, m); if there is no solution, at least one joint is not finite."""
 
     def _of_all(self, *counts: int) -> Formula:
         make = partial(Formula.of, discards_incomplete=True)
@@ -202,7 +204,7 @@ class Family:
         ``build(geometry, task_map, redundant)`` returns a solver for the redundant joints with these indices, or
         raises `NotApplicableError` with the reason.
     source : str
-        Source of the formulas.
+        Publication or module that gives the formulas.
     """
 
     name: str

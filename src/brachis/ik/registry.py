@@ -1,11 +1,11 @@
 """Search for a closed form for a choice of redundant joints, by geometry.
 
-The families are listed in `BUILTIN`. Other packages add theirs through the entry-point group ``brachis.ik``, whose
-entries are `Family` objects (see `ik_family`). A solver is returned only after its solutions have been checked with the
-forward kinematics of the chain (`check_answers`).
+The built-in families are listed in `BUILTIN`. Other packages add families through the entry-point group ``brachis.ik``,
+whose entries are `Family` objects (see `ik_family`). A solver is returned only after its solutions have been checked
+with the forward kinematics of the chain (`check_answers`).
 
-If no family fits the chain itself, the families are tried on the ideal chain that is closest to it (`snap_axes`). The
-solutions are then polished.
+If no family fits the chain itself, the families are tried on the closest ideal chain (`snap_axes`). The solutions for
+the ideal chain are then polished.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class TriedDecomposition:
     ----------
     redundant_joints : tuple of str
     family : str or None
-        The family that fits; None if none does.
+        Name of the family that fits; None if no family fits.
     solver : IKSolver or None
     reasons : dict of str to str
-        Reasons why the other families that were tried do not fit.
+        Reasons why the other families that were tried do not fit, by the names of these families.
     remark : str
-        Remark about the solver; empty without one.
+        Remark about the solver; empty if there is none.
     """
 
     redundant_joints: tuple[str, ...]
@@ -85,7 +85,7 @@ class Match(TriedDecomposition):
 
 
 def check_families(families: Sequence[Family]) -> None:
-    """Refuse anything except a list of families with unique names.
+    """Reject anything except a list of families with unique names.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def check_families(families: Sequence[Family]) -> None:
                 allowed="a function with the decorator @brachis.ik.ik_family(name, source=...), which returns "
                 "an IKSolver (docs/own_closed_form.md)",
             )
-        if family in BUILTIN:  # to be tried first
+        if family in BUILTIN:  # families to be tried first
             continue
         problem = _refuse_name(family.name, taken)
         if problem:
@@ -116,7 +116,7 @@ def check_families(families: Sequence[Family]) -> None:
 
 
 def _refuse_name(name: object, taken: Collection[str]) -> str | None:
-    """Return the reason why a family cannot have a name; None if it can."""
+    """Return the reason why a family cannot have this name; None if it can."""
     if not isinstance(name, str) or not name.strip():
         return "a family needs a name"
     return "a family of this name exists already" if name in taken else None
@@ -124,7 +124,7 @@ def _refuse_name(name: object, taken: Collection[str]) -> str | None:
 
 @cache
 def plugin_families() -> tuple[Family, ...]:
-    """Return the families of the entry-point group ``brachis.ik``; a broken one is reported when it is tried."""
+    """Return the families of the entry-point group ``brachis.ik``; a broken family is reported when it is tried."""
     return tuple(
         _load(entry) for entry in importlib.metadata.entry_points(group="brachis.ik")
     )
@@ -145,7 +145,7 @@ def _load(entry: importlib.metadata.EntryPoint) -> Family:
             reason = problem
 
     def refuse(*_arguments: object) -> IKSolver:
-        """Raise the reason why the family cannot be used."""
+        """Raise an error with the reason why the family cannot be used."""
         raise NotApplicableError(reason)
 
     return Family(entry.name, refuse, entry.value)
@@ -165,7 +165,7 @@ def find(
     robot : Robot
     task_map : TaskMap
     redundant_joints : sequence of str
-        The redundant joints. Their number is that of the robot's joints minus the rows of the task space.
+        The redundant joints. There must be as many as the robot has joints, less the rows of the task space.
     families : sequence of Family, optional
         Families to try before the built-in and installed ones.
 
@@ -199,7 +199,7 @@ def find(
 
 
 def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> None:
-    """Refuse redundant joints that do not exist, and a wrong number of them.
+    """Reject redundant joints that do not exist, and a wrong number of redundant joints.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> Non
             redundant_joints=names,
             found=f"{robot.n} for {task_map.m} rows",
             allowed=f"at most {robot.n} rows, such as [{', '.join(default_task_space(robot))}]; or task_space: joints, "
-            f"with a path of the joints such as line: {{by: [{by}]}}",
+            f"with a joint path such as line: {{by: [{by}]}}",
         )
     if len(set(names)) != len(names) or len(names) != r:
         joints = write_count(robot.n, "joint")
@@ -230,9 +230,9 @@ def _check_names(robot: Robot, task_map: TaskMap, names: tuple[str, ...]) -> Non
 def find_all(
     robot: Robot, task_map: TaskMap, *, families: Sequence[Family] = ()
 ) -> list[TriedDecomposition]:
-    """Try every choice of redundant joints; see `find`. Paths of joints need no closed form.
+    """Try every choice of redundant joints; see `find`. Joint paths need no closed form.
 
-    A virtual joint of the tool with a range is always redundant, because closed forms do not respect ranges.
+    A virtual joint of the tool that has a range is always redundant, because closed forms do not respect ranges.
     """
     r = robot.n - task_map.m
     if r < 0 or isinstance(task_map, JointSpace):
@@ -250,7 +250,7 @@ class _Matcher:
     Parameters
     ----------
     robot, task_map, families
-        See `find`.
+        The arguments of `find`.
     """
 
     def __init__(
@@ -264,17 +264,17 @@ class _Matcher:
 
     @cached_property
     def _ideal(self) -> SnappedChain | None:
-        """The ideal arm within the tolerance; it does not depend on the redundant joints."""
+        """The ideal arm within the tolerance of the robot; it does not depend on the redundant joints."""
         return snap_axes(self._geometry, self._task_map)
 
     @cached_property
     def _rough(self) -> SnappedChain | None:
-        """The ideal arm within a large tolerance (rad, m), which may be the intended one."""
+        """The ideal arm within a larger tolerance (rad, m) of the robot; the URDF may be meant to describe it."""
         return snap_axes(self._geometry, self._task_map, 2e-3)
 
     @cached_property
     def _content(self) -> bytes:
-        """Everything on which the result depends, except the families."""
+        """Everything on which the result of a match depends, except the families."""
         geometry = self._geometry
         task_map = self._task_map
         content = (
@@ -297,7 +297,8 @@ class _Matcher:
             if len(_KNOWN) >= _MOST_KNOWN:
                 _KNOWN.clear()
             reasons = tried.reasons.values()
-            # Not if a library is missing, or if code of another package failed: that may change.
+            # The result is not cached if a library is missing or if code of another package failed, because that may
+            # change.
             if not any(
                 reason.startswith((NOT_INSTALLED, _FAILED)) for reason in reasons
             ):
@@ -322,7 +323,7 @@ class _Matcher:
         reasons: dict[str, str],
         ideal: SnappedChain | None,
     ) -> Match | None:
-        """Find the first family that fits the robot or the ideal arm; record the reasons of the others."""
+        """Find the first family that fits the robot or the ideal arm; record why the families before it do not fit."""
         geometry = ideal.geometry if ideal else self._geometry
         remark = ""
         for family in self._families:
@@ -339,7 +340,7 @@ class _Matcher:
             except Exception as error:
                 if family in BUILTIN:
                     raise
-                # Another package's fault.
+                # The code of another package may fail in any way.
                 reasons[family.name] = f"{_FAILED}: {type(error).__name__}: {error}"
             else:
                 reasons.pop(family.name, None)
@@ -350,7 +351,7 @@ class _Matcher:
     def _name_rounding(
         self, redundant: tuple[int, ...], reasons: dict[str, str]
     ) -> None:
-        """Record which families would fit if the axes were closer to those of the ideal arm."""
+        """Record which families would fit if the axes were closer to the axes of the ideal arm."""
         rough = self._rough
         if rough is None or max(rough.turned, rough.shifted) < TOLERANCE:
             return
@@ -366,9 +367,9 @@ class _Matcher:
 
 
 _MOST_KNOWN = 256
-"""Largest number of choices of redundant joints whose closed forms are cached."""
+"""Maximum number of choices of redundant joints whose closed forms are cached."""
 _KNOWN: dict[tuple[object, ...], tuple[tuple[Family, ...], TriedDecomposition]] = {}
-"""Closed forms, whose formulas are thus recorded only once; and families, whose ids are in the keys."""
+"""Cached closed forms, so that their formulas are recorded only once, and the families whose ids are in the keys."""
 
 
 def missing_eaik(tried: Sequence[TriedDecomposition]) -> str:

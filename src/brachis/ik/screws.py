@@ -1,15 +1,17 @@
 """A joint as a screw, and the circle or line on which it moves a position.
 
-A step of a closed form has a condition for a position that one joint moves: a component along a direction, or a
-distance. On a circle, both conditions have the form ``a cos + b sin = c``, with two roots. On a line, a component is
-linear and a distance quadratic. Roots are distinguished by the sign of the condition's derivative, so a root keeps its
-place along any continuous curve until the two meet. See Subproblems 1 to 4 of A. J. Elias, J. T. Wen, "IK-Geo: unified
-robot inverse kinematics using subproblem decomposition", 2022, where the solutions have no such order.
+A step of a closed form sets a condition on a position that one joint moves: its component along a direction, or its
+distance from a point. On a circle, both conditions have the form ``a cos + b sin = c``, with two roots. On a line, a
+component is linear and a distance quadratic. Roots are distinguished by the sign of the condition's derivative, so a
+root keeps its place along any continuous curve until the two roots meet. See Subproblems 1 to 4 of A. J. Elias, J. T.
+Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022, where the solutions have no such
+order.
 
 Vectors have their components along the first axis, followed by the alternatives (one axis for each step with two
 solutions) and the samples. Joint positions only have alternatives and samples.
 
-`ChainGeometry` has the screw axes of a chain, from the Pinocchio model. The closed forms only use these axes.
+`ChainGeometry` holds the screw axes of a chain, computed from the Pinocchio model. The closed forms use only these
+axes.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ class Screw:
     Attributes
     ----------
     axis : (3, ...) ndarray
-        Unit direction.
+        Unit vector along the axis of the joint.
     point : (3, ...) ndarray
         A point on the axis, m; without meaning for a slide.
     revolute : bool
@@ -49,7 +51,7 @@ class Screw:
         return Screw(-self.axis, self.point, self.revolute)
 
     def velocity(self, position: np.ndarray) -> np.ndarray:
-        """Differentiate a position with respect to the joint that moves it, (3, ...)."""
+        """Differentiate a position with respect to this joint, which moves it, (3, ...)."""
         return cross(self.axis, position - self.point) if self.revolute else self.axis
 
     def orbit(self, position: np.ndarray) -> Circle | Line:
@@ -82,9 +84,9 @@ class Circle:
     def component(
         self, direction: np.ndarray, level: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Return the angles at which ``direction . position = level``: it rises at the first, falls at the second.
+        """Return the angles at which ``direction . position = level``; the left side rises at the first one.
 
-        The two angles follow each other along the axis `slot`. They are NaN if the level is out of reach.
+        The two angles follow each other along the axis `slot`. Both are NaN if the level is out of reach.
         """
         level = level - dot(direction, self.middle)
         return cosine_roots(
@@ -94,7 +96,7 @@ class Circle:
     def distance(
         self, position: np.ndarray, squared: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Return the angles at a distance from another position: approaching it first, leaving it second."""
+        """Return the two angles at a distance from another position, first the one at which the distance decreases."""
         away = position - self.middle
         level = 0.5 * (dot(away, away) + dot(self.arm, self.arm) - squared)
         return cosine_roots(dot(away, self.arm), dot(away, self.across), level, slot)
@@ -119,13 +121,13 @@ class Line:
     def component(
         self, direction: np.ndarray, level: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Return the slide at which ``direction . position = level``. It is the only one, so `slot` is not used."""
+        """Return the slide at which ``direction . position = level``. There is only one, so `slot` is not used."""
         return (level - dot(direction, self.start)) / dot(direction, self.axis)
 
     def distance(
         self, position: np.ndarray, squared: np.ndarray, slot: int
     ) -> np.ndarray:
-        """Return the slides at a distance from another position: approaching it first, leaving it second."""
+        """Return the two slides at a distance from another position, first the one at which the distance decreases."""
         away = position - self.start
         nearest = dot(self.axis, away)
         root = formula.sqrt(nearest * nearest - dot(away, away) + squared)
@@ -143,7 +145,7 @@ class PosedScrews:
     points : (3, n, K) ndarray
         A point on each axis of rotation, m; without meaning for prismatic joints.
     tool_position : (3, K) ndarray
-        m.
+        Position of the tool, m.
     tool_rotation : (3, 3, K) ndarray
     revolute : (n,) bool ndarray
     """
@@ -183,12 +185,12 @@ class PosedScrews:
 
 @dataclass(frozen=True)
 class Poses:
-    """N poses, or the motions that move the origin there; components are along the first axis (see `vectors`).
+    """N poses, or the motions that move the origin to them; components are along the first axis (see `vectors`).
 
     Attributes
     ----------
     position : (3, ..., N) ndarray
-        m.
+        Positions of the poses, m.
     rotation : (3, 3, ..., N) ndarray
     """
 
@@ -204,7 +206,7 @@ class Poses:
 
     @classmethod
     def of_tool(cls, screws: PosedScrews) -> Poses:
-        """Return the placements of the tool."""
+        """Return the placements of the tool in the postures."""
         return cls(screws.tool_position, screws.tool_rotation)
 
     def targets(self) -> np.ndarray:
@@ -217,7 +219,7 @@ class Poses:
         return apply(self.rotation, point) + self.position
 
     def __matmul__(self, moved: Poses) -> Poses:
-        """Move other poses by these poses as motions; N or 1 of each."""
+        """Move other poses by these poses as motions; each side has N poses or 1."""
         rotation = np.einsum("ij...,jk...->ik...", self.rotation, moved.rotation)
         return Poses(self.move(moved.position), rotation)
 
@@ -251,15 +253,14 @@ class ChainGeometry(Chain):
     def _generators(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For each axis the two (3, 3) matrices of Rodrigues' formula, for the sine and for 1 - cosine of the angle.
 
-        They are multiplied from the left onto the columns of rotation matrices, (3, 3, K or 1): one product for all
-        samples.
+        Rotation matrices, (3, 3, K or 1), are multiplied by them from the left, in one product for all samples.
         """
         skews = [np.cross(axis, np.eye(3)) for axis in self.axes]
         return [(skew, skew @ skew) for skew in skews]
 
     @cached_property
     def random_screws(self) -> PosedScrews:
-        """Screws in random postures, always the same ones. Closed forms use them to see what varies."""
+        """Screws in random postures, always the same ones. Closed forms use them to see which quantities vary."""
         rng = np.random.default_rng(1)
         return self.screws_at(rng.uniform(-np.pi, np.pi, (256, self.n)))
 

@@ -1,14 +1,16 @@
-"""Chains whose axes are parallel, perpendicular or meeting up to rounded figures, as in rpy="1.5708 0 0".
+"""Chains whose axes are parallel, perpendicular or meeting except for rounded figures, as in rpy="1.5708 0 0".
 
-The ideal chain follows the given one from the base to the tool. The direction of a joint is compared with those that no
-joint turns relative to it: the direction of the revolute joint before it, and of the slides in between. If it is
-parallel to one of these to within a tolerance, it becomes exactly parallel. Otherwise, if it is perpendicular to some
-of them, it becomes exactly perpendicular. A revolute axis that meets the previous one, or nearly coincides with it, is
-moved there; if the previous axis meets its own predecessor nearby, it is moved into the same point. Every rotation or
-shift carries the rest of the chain and the tool along, so errors do not add up along the chain. Relations that follow
-from neighbours, such as three parallel axes or three axes that meet in one point, then hold exactly.
+The ideal chain follows the given one from the base to the tool. The direction of a joint is compared with the
+directions that no joint turns relative to it: those of the revolute joint before it and of the slides in between. If
+the direction is parallel to one of these to within a tolerance, it becomes exactly parallel. Otherwise, if the
+direction is almost perpendicular to some of these, it becomes exactly perpendicular. A revolute axis that almost meets
+the previous one, or almost coincides with it, is moved onto it. If the previous axis meets its own predecessor nearby,
+the axis is moved into the same point. Every rotation or shift carries the rest of the chain and the tool along, so
+errors do not add up along the chain. Relations that follow from neighbours, such as three parallel axes or three axes
+that meet in one point, then hold exactly.
 
-The solutions of the ideal chain's closed forms are close to those of the given chain. Newton's method refines them.
+The closed forms of the ideal chain give solutions close to the solutions for the given chain. Newton's method refines
+them.
 """
 
 from __future__ import annotations
@@ -29,9 +31,9 @@ from brachis.robot.joints import complement
 from brachis.robot.task_map import Pose
 
 TOLERANCE = 1e-4
-"""Axes this close to parallel or perpendicular (rad), or to meeting (m), are assumed to be intended so."""
+"""Axes that are parallel or perpendicular (rad), or meet (m), to within this tolerance are assumed to be meant so."""
 _SKEW = 1e-2
-"""Axes at a smaller angle (rad) have no reliable meeting point."""
+"""Angle between two axes, rad, below which their meeting point is not reliable."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class SnappedChain:
     turned : float
         Largest angle between an axis of the given chain and its ideal direction relative to the axes before it, rad.
     shifted : float
-        Largest distance between an axis and its ideal place, m.
+        Largest distance between an axis of the given chain and its ideal place, m.
     """
 
     geometry: ChainGeometry
@@ -60,7 +62,7 @@ class SnappedChain:
 def snap_axes(
     geometry: ChainGeometry, task_map: TaskMap, tolerance: float = TOLERANCE
 ) -> SnappedChain | None:
-    """Make axes that are almost parallel, perpendicular or meeting exactly so.
+    """Make axes exactly parallel, perpendicular or meeting where they almost are.
 
     Parameters
     ----------
@@ -68,7 +70,7 @@ def snap_axes(
     task_map : TaskMap
         For positions, the axes of the world and a tool on the last axis of rotation are taken into account as well.
     tolerance : float, optional
-        rad for directions, m for points.
+        Tolerance, rad for directions and m for points.
 
     Returns
     -------
@@ -172,7 +174,7 @@ class _Chain:
     def _nearest(
         self, axis: np.ndarray, point: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points where the last axis and another one are closest; beside the last point if parallel."""
+        """Return the points where the last axis and another one are closest; if parallel, beside the last point."""
         if self._axis is None:
             return point, point
         before = self._point
@@ -184,7 +186,7 @@ class _Chain:
 def _nearest_ideal(
     axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
-    """Make a direction exactly parallel to one of others, else perpendicular to one or two, if it almost is."""
+    """Make a direction exactly parallel to a fixed one, or else perpendicular to one or two, if it almost is."""
     for fixed_axis in fixed:
         if np.linalg.norm(np.cross(axis, fixed_axis)) < tolerance:
             return fixed_axis * np.sign(axis @ fixed_axis)
@@ -209,9 +211,9 @@ def _least_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 class PolishedSolver(IKSolver):
     """Closed form of an ideal chain, refined for the given chain by Newton's method.
 
-    A solution of the ideal chain is used if the method leads from it to a solution next to it. Labels and margins of
-    the branches are those of the ideal chain. If its margins are smaller than about the square root of the deviation of
-    the given chain, solutions may be missing.
+    A solution of the ideal chain is used if the method leads from it to a nearby solution of the given chain. The
+    branches have the labels and margins of the ideal chain. Where these margins are smaller than about the square root
+    of the given chain's deviation, solutions may be missing.
 
     Parameters
     ----------
@@ -272,7 +274,7 @@ class PolishedSolver(IKSolver):
         return self.ideal.branch_margins(q, branch)
 
     def margin_formulas(self, branch: int, n: int) -> FormulaQuantity | None:
-        """Return the formulas of the ideal chain."""
+        """Return the formulas of the ideal chain's margins."""
         return self.ideal.margin_formulas(branch, n)
 
     def margin_gradient(self, q: np.ndarray, branch: int) -> np.ndarray:

@@ -15,11 +15,11 @@ from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import complement, difference
 
 _SLOPES = 10
-"""Number of postures inside a branch in which the slopes of its margins are checked."""
+"""Number of postures inside each branch in which the slopes of its margins are checked."""
 
 
 def _compute_margins(solver: IKSolver, q: np.ndarray, branch: int) -> np.ndarray:
-    """Compute branch margins, (K, k), without recording a formula: this is faster for a single call.
+    """Compute branch margins, (K, k), without recording a formula, which is faster for a single call.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def check_answers(
     expected = (len(q), len(solver.branches), solver.alternatives, len(non_redundant))
     if answers.shape != expected:
         raise NotApplicableError(
-            f"its answers have the shape {answers.shape}, not {expected}"
+            f"its solutions have the shape {answers.shape}, not {expected}"
         )
     turning = robot.revolute[non_redundant]
     off = np.abs(difference(answers, q[:, None, None, non_redundant], turning)).max(
@@ -90,7 +90,7 @@ def check_answers(
     )
     if not np.all(np.nanmin(np.where(np.isnan(off), np.inf, off), axis=(1, 2)) < 1e-6):
         raise NotApplicableError(
-            "its answers do not contain all postures that reach the target"
+            "its solutions do not contain all postures that reach the target"
         )
     exists = np.isfinite(answers).all(axis=3)
     sample = np.nonzero(exists)[0]
@@ -100,7 +100,7 @@ def check_answers(
     miss = np.abs(task_map.difference(placed, targets[sample])).max()
     if not miss < 1e-8:
         raise NotApplicableError(
-            f"its answers miss the target by {miss:.1e} m or rad; allowed: less than 1e-8"
+            f"its solutions miss the target by {miss:.1e} m or rad; allowed: less than 1e-8"
         )
     _check_slopes(solver, q)
 
@@ -108,7 +108,7 @@ def check_answers(
 def _check_slopes(solver: IKSolver, q: np.ndarray) -> None:
     """Compare the slopes of the branch margins with central differences, in postures, (K, n).
 
-    Slopes that are derived from formulas need no check, and recording them takes time.
+    Slopes that are derived from formulas are not checked: they need no check, and recording them takes time.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _check_slopes(solver: IKSolver, q: np.ndarray) -> None:
         if 2 * is_wrong.sum() > len(inside):
             raise NotApplicableError(
                 f"its margin_gradient contradicts differences of its branch_margins in branch {label}, by up to "
-                f"{miss.max():.1e}; margins have to be analytic, without abs or comparisons"
+                f"{miss.max():.1e}; margins must be analytic, without abs or comparisons"
             )
 
 
@@ -171,7 +171,7 @@ def _postures_inside(robot: Robot, solver: IKSolver) -> np.ndarray:
 
 
 def ranges_to_check(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Return whole turns for angles, and ranges for slides: a boom need not be defined for negative lengths.
+    """Return whole turns for angles, and ranges for slides, because a boom need not be defined for negative lengths.
 
     Large ranges are cut to 20 m around zero, because positions in kilometres are not accurate to the tolerances.
     """

@@ -1,10 +1,10 @@
-"""Six joints of which the last three, or the first three, have axes that meet in one point.
+"""Six joints; the axes of the last three, or of the first three, meet in one point.
 
 Let W0 be this point with the six joints at zero. Then E_1 ... E_6 = D (`FactoredSolver`) moves it to
 
-    W = E_a E_b E_c W0 = D W0,
+    W = E_a E_b E_c W0 = D W0.
 
-because the last three joints u, v, w turn about it. These equations contain only the first three joints a, b, c
+The last three joints u, v, w turn about this point, so these equations contain only the first three joints a, b, c
 (`point_recipes`). What remains is a rotation R_u R_v R_w = (R_a R_b R_c)^-1 R_D =: R, for axes u, v, w at any angles:
 
     v    u . R_v w = u . R w, two solutions
@@ -50,7 +50,7 @@ _WRIST = Factor(_wrist_factor, ("noflip", "flip"))
 
 
 class SphericalWristSolver(FactoredSolver):
-    """Closed form of six joints with a spherical wrist or shoulder; see the formulas of the module.
+    """Closed form of six joints with a spherical wrist or shoulder; see the formulas in the docstring of the module.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ class SphericalWristSolver(FactoredSolver):
         names = ", ".join(six.names[3:])
         centre = six.meeting(3, 4, 5)
         if centre is None:
-            reason = "a joint slides"
+            reason = "one of the joints is prismatic"
             if six.revolute[3:].all():
-                reason = f"they miss it by {six.miss(3, 4, 5):.2g} m"
+                reason = f"they miss a common point by {six.miss(3, 4, 5):.2g} m"
             raise NotApplicableError(
                 f"the axes of {names} do not meet in a point: {reason}"
             )

@@ -1,10 +1,10 @@
 """Vectors with their three components along the FIRST axis, and the subproblems of closed forms.
 
-Arrays have the shape (3, ...); the other axes broadcast (samples, then branches). Functions of complex numbers are
-analytic: there are no conjugates and no absolute values.
+Arrays have the shape (3, ...); the other axes broadcast (samples, then branches). The functions are analytic for
+complex numbers: they use no conjugates and no absolute values.
 
-Subproblems as in B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985, and A. J. Elias,
-J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022.
+The subproblems are those of B. Paden, Kinematics and control of robot manipulators, PhD thesis, Berkeley 1985, and A.
+J. Elias, J. T. Wen, "IK-Geo: unified robot inverse kinematics using subproblem decomposition", 2022.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def cosine_roots(a: np.ndarray, b: np.ndarray, c: np.ndarray, slot: int) -> np.n
     """Return the angles in [-2 pi, 2 pi] at which ``a cos + b sin = c``.
 
     The two angles follow each other along the axis `slot`: the derivative of the left side, ``b cos - a sin``, is
-    positive at the first one and negative at the second. They are NaN if c is out of reach.
+    positive at the first one and negative at the second. Both are NaN if c is out of reach.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         half = formula.arccos(c / formula.sqrt(a * a + b * b))
@@ -88,7 +88,7 @@ def nan_where_negative(level: np.ndarray, values: np.ndarray) -> np.ndarray:
 def determinants(matrices: np.ndarray) -> np.ndarray:
     """Compute determinants (K,) of matrices (m, m, K); real or complex, and analytic.
 
-    Laplace's expansion is used: it has no division, and computes each minor once.
+    Laplace's expansion is used because it needs no division; each minor is computed only once.
     """
     minors = {0: np.ones_like(matrices[0, 0])}
     for row in matrices:

@@ -1,4 +1,4 @@
-"""The prescribed path and its first three derivatives with respect to the path coordinate."""
+"""The prescribed path and its first three derivatives with respect to the path coordinate s."""
 
 from brachis.path.build import build_path, check_on_path, path_of
 from brachis.path.from_curve import bspline_segment, with_feed_rates

@@ -1,4 +1,4 @@
-"""The path of a task: the curves of its segments, joined with blends, beginning at the tool of the start posture."""
+"""The path of a task: the curves of its segments, joined with blends; it begins at the tool of the start posture."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _unread(shape: PointFile, context: SegmentContext) -> Curve:
         ".file",
         found=shape.file,
         allowed="a curve",
-        hint="brachis.load_task reads it and makes a curve of it",
+        hint="brachis.load_task reads the file and turns it into a curve",
     )
 
 
@@ -105,7 +105,7 @@ BUILDERS: Final[dict[type, Callable[[Any, SegmentContext], Curve]]] = {
     BSplineCurve: bspline_curve,
     PointFile: _unread,
 }
-"""For every form of segment, the function that builds the curve of its rows, or of a pose's position."""
+"""For every form of segment, the function that builds the curve of the rows or, for poses, of the position."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class RowCoordinates:
     Attributes
     ----------
     rows : tuple of str
-        Names of the first coordinates: those of the position come first.
+        Names of the rows, which come first among the coordinates; the position rows come first among the rows.
     """
 
     rows: tuple[str, ...]
@@ -123,7 +123,7 @@ class RowCoordinates:
     blend = staticmethod(blend_rows)
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """Return the curve of the segment with this index in the path, beginning at `start`.
+        """Return the curve of a segment, whose index in the path is `index`, beginning at `start`.
 
         Raises
         ------
@@ -147,15 +147,15 @@ class JointCoordinates(RowCoordinates):
     """The positions of all joints."""
 
     def curve(self, segment: Segment, index: int, start: Array) -> Curve:
-        """Return the curve of a segment, whose coordinates may be in a different order of the joints."""
+        """Return the curve of a segment, whose coordinates may list the joints in a different order."""
         if not isinstance(segment, LineSegment | SplineSegment | BSplineSegment):
             by = ", ".join(["1.5708", *["0"] * (len(self.rows) - 1)])
             raise PathError(
-                "a path of joints cannot have this segment",
+                "a joint path cannot have this segment",
                 found=segment.kind,
                 allowed="line: {to: ...}, line: {by: ...}, spline, bspline, csv",
                 where=f"path[{index}]",
-                hint=f"A turn of one joint by 90 degrees is line: {{by: [{by}]}}",
+                hint=f"To turn one joint by 90 degrees, write line: {{by: [{by}]}}",
             )
         names = getattr(segment.shape, "joints", None)
         if names is None:
@@ -165,7 +165,7 @@ class JointCoordinates(RowCoordinates):
         check_names("joint", names, joints, where)
         if sorted(names) != sorted(joints):
             raise PathError(
-                "the joints are not each named once",
+                "each joint must be named exactly once",
                 found=list(names),
                 allowed=", ".join(joints),
                 where=where,
@@ -183,7 +183,7 @@ def _permute(columns: np.ndarray, _sigma: Array, derivatives: Array) -> Array:
 
 @dataclass(frozen=True)
 class PoseCoordinates(RowCoordinates):
-    """Rows of the position, then the rotation matrix row by row; `rows` are the rows of the position."""
+    """Rows of the position, then the rotation matrix row by row; `rows` names only the rows of the position."""
 
     corner = staticmethod(pose_corner)
     blend = staticmethod(blend_poses)
@@ -199,13 +199,13 @@ class PoseCoordinates(RowCoordinates):
                 raise context.wrong(
                     "the turn has zero length",
                     found="0 degrees",
-                    allowed="an orientation that differs from the one before",
+                    allowed="an orientation that differs from the previous one",
                 )
             still = LineCurve(position, np.zeros_like(position), abs(turn.angle))
             return pose_curve(still, turn.over(still.length))
         if not self.rows:
             raise context.wrong(
-                "this segment moves the position, which is not in the task space",
+                "this segment moves the position, but the task space has no position rows",
                 found=segment.kind,
                 allowed="turn: {rotate: ...} or turn: {to: ...}",
             )
@@ -240,7 +240,7 @@ def build_path(
     start : array_like, shape (c,)
         Task coordinates at the start posture, m and rad; for an orientation, the rotation matrix row by row.
     task_space_rows : sequence of str
-        Rows of the task space: out of x, y, z, followed by one of roll, pitch, yaw, or by rx, ry, rz for orientations;
+        Rows of the task space: some of x, y, z, followed by one of roll, pitch, yaw, or by rx, ry, rz for orientations;
         or the rows of all joints (`brachis.robot.task_map.protocol.joint_rows`).
     frame : PathFrame, optional
         Frame in which the segments are given. Default: the world. The start is always in the world.
@@ -250,8 +250,9 @@ def build_path(
     Returns
     -------
     Path
-        The path in the world, three times continuously differentiable in s except at its stops: for poses a `PosePath`,
-        whose samples have the body twist; for other orientations an `OrientedPath`.
+        The path in the world, three times continuously differentiable with respect to s except at its stops. For poses,
+        the path is a `PosePath`, whose samples have the body twist; for orientations with fewer position rows, an
+        `OrientedPath`.
 
     Raises
     ------
@@ -275,7 +276,7 @@ def build_path(
     elif rows[-3:] == TURN_ROWS:
         path_type = PosePath if rows == POSE_ROWS else OrientedPath
         coordinates = PoseCoordinates(position_rows(rows))
-        # The closest rotation: the polar decomposition without its stretch.
+        # This is the closest rotation: the polar decomposition without its stretch.
         u, _, vt = np.linalg.svd(rotations(point))
         point[-9:] = (u @ vt).ravel()
     if frame is not None:
@@ -300,7 +301,7 @@ def build_path(
 def _line_to(
     segment: Segment, place: Array, start: Array, rows: tuple[str, ...]
 ) -> Segment:
-    """Replace a line to a posture by the line from `start` to `place`, (c,), with the shorter rotation."""
+    """Replace a line to a posture by the line from `start` to `place`, (c,), with the shorter of the two rotations."""
     orientation = None
     if rows[-3:] == TURN_ROWS:
         turn = rotation_of(rotations(place))
@@ -319,12 +320,13 @@ def _join(
     segments: Sequence[Segment],
     coordinates: RowCoordinates,
 ) -> tuple[CurveSpan, ...]:
-    """Return the parts of the segments' curves, joined end to end, with rounded corners.
+    """Return the spans of the segments' curves, joined end to end, with rounded corners.
 
     Raises
     ------
     PathError
-        Curves do not continue each other to the third derivative, without a blend or a stop; or a blend does not fit.
+        Consecutive curves do not match up to the third derivative, and there is no blend or stop between them; or a
+        blend does not fit.
     """
     corners = []
     spans = []
@@ -343,7 +345,7 @@ def _join(
             spans.append(CurveSpan(rounded, 0.0, rounded.length))
     spans.append(CurveSpan(curves[-1], taken, curves[-1].length, len(curves) - 1))
     refuse_corners(corners)
-    # Two blends that meet in the middle of a segment leave nothing of it except rounding.
+    # If two blends meet in the middle of a segment, nothing is left of the segment except rounding errors.
     return tuple(span for span in spans if span.length > 1e-11 * span.curve.length)
 
 
@@ -362,9 +364,9 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     Raises
     ------
     StartError
-        The tool of the start posture is not at the task's ``path_start``.
+        The tool in the start posture is not at the task's ``path_start``.
     PathError, UnknownNameError, InputError
-        See `build_path`; or ``path_start`` does not fit the task space.
+        As for `build_path`; or ``path_start`` does not fit the task space.
     """
     frame = None
     if task.path_frame is not None:
@@ -391,7 +393,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
 def check_on_path(
     task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str, where: str
 ) -> None:
-    """Refuse a posture, (n,), given at `where`, whose tool is not at the start or end of the path, `target`, (c,).
+    """Reject a posture, (n,), given at `where`, whose tool is not at `target`, (c,), the start or end of the path.
 
     Raises
     ------
@@ -411,7 +413,7 @@ def check_on_path(
             allowed=f"at most {allowed} {unit}",
             hint=_place_hint(task_map, place, target)
             or _posture_hint(task_map.robot, posture)
-            or f"Choose a posture whose tool is at the path's {name}",
+            or f"Choose a posture with the tool at the {name} of the path",
         )
 
 
@@ -424,7 +426,7 @@ def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
 
 
 def _place_hint(task_map: TaskMap, place: np.ndarray, target: np.ndarray) -> str | None:
-    """Return a hint about stated coordinates, (c,), that differ from those of the tool, (c,)."""
+    """Return a hint about stated coordinates, (c,), that differ from the tool's coordinates, (c,)."""
     axes = len(task_map.axes)
     hint = place_hint(place[:axes], target[:axes], task_map.rows)
     if axes:

@@ -1,4 +1,4 @@
-"""The context of a segment: its key and its start, with the checks that all builders share."""
+"""The context of a segment: its key, its start, and the checks that all functions for building curves share."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from brachis.robot.task_map.protocol import position_rows
 
 @dataclass(frozen=True, eq=False)
 class SegmentContext:
-    """The data that the builder of a segment's curve needs besides the segment itself.
+    """The data that a function needs, besides the segment itself, to build the curve of a segment.
 
     Attributes
     ----------
     key : str
-        Key of what describes the segment, for example ``path[0].line``.
+        Key under which the segment is described, for example ``path[0].line``.
     start : ndarray, shape (m,)
         Task coordinates at which the segment starts.
     rows : tuple of str
-        Rows of the task space; for a pose its position rows.
+        Rows of the task space; for a pose, only the position rows.
     """
 
     key: str
@@ -34,23 +34,23 @@ class SegmentContext:
 
     @property
     def positions(self) -> tuple[str, ...]:
-        """The position rows."""
+        """The position rows among `rows`."""
         return position_rows(self.rows)
 
     @property
     def position(self) -> Array:
-        """The start in the position rows."""
+        """The position at which the segment starts."""
         return self.start[: len(self.positions)]
 
     def coordinates(
         self, values: Sequence[float], key: str, rows: Sequence[str]
     ) -> Array:
-        """Return values as an array, after a check that there is one for each of `rows`.
+        """Return values as an array, after checking that there is one value for each of `rows`.
 
         Raises
         ------
         PathError
-            The number of values differs.
+            The number of values differs from the number of rows.
         """
         if len(values) != len(rows):
             raise self.wrong(
@@ -62,7 +62,7 @@ class SegmentContext:
         return np.asarray(values, dtype=float)
 
     def need_rows(self, what: str, *counts: int) -> None:
-        """Refuse a form of segment unless the number of position rows is among `counts`.
+        """Reject a form of segment unless the number of position rows is among `counts`.
 
         Raises
         ------
@@ -76,7 +76,7 @@ class SegmentContext:
             )
 
     def zero_length(self, key: str, found: object) -> PathError:
-        """Return the error that the segment has zero length."""
+        """Return the error for a segment of zero length."""
         return self.wrong(
             "the segment has zero length",
             key,
@@ -94,7 +94,7 @@ class SegmentContext:
 
 
 def place(rows: Sequence[str], point: Array) -> str:
-    """Write coordinates in words, to the nanometre; for a pose only its position."""
+    """Write coordinates in words, to the nanometre; for a pose, write only its position."""
     return ", ".join(
         f"{row} = {round(value, 9) + 0.0:.6g}"
         for row, value in zip(rows, point, strict=False)

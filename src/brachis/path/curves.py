@@ -1,4 +1,4 @@
-"""Curves: lines, arcs, helices and splines; and the functions that build them from segments, except for splines."""
+"""Curves: lines, arcs, helices and splines; and the functions that build lines, arcs and helices from segments."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ from brachis.task.segments import (
 )
 
 _MOST_TURNS = 1000
-"""Largest number of turns of an arc. Each has four knots: a plan of 100 turns takes half a minute and 1.1 GB of
-memory."""
+"""Maximum number of turns of an arc.
+
+Each turn has four knots: planning 100 turns takes half a minute and 1.1 GB of memory.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,12 @@ class SplineCurve:
     Attributes
     ----------
     spline : Spline
-        With values of shape (m,).
+        Spline with values of shape (m,).
     length : float
-        Range of sigma; for waypoints the cumulative chord length of the position rows, m (of the angle, rad, if the
-        position stands still).
+        Range of sigma. For waypoints, it is the cumulative chord length of the position rows, m, or of the angle, rad,
+        if the position stands still.
     knots : ndarray
-        Values of sigma between which the spline is a polynomial; for waypoints their cumulative chord lengths.
+        Values of sigma between which the spline is a polynomial; for waypoints, the cumulative chord lengths.
     """
 
     spline: Spline
@@ -51,20 +53,20 @@ class SplineCurve:
 
 
 def septic(start: Array, end: Array, length: float) -> SplineCurve:
-    """Return the septic polynomial with given values and first three derivatives at both ends.
+    """Return the septic polynomial with the given values and first three derivatives at both ends.
 
     Parameters
     ----------
     start, end : ndarray, shape (4, m)
         Value and first, second and third derivatives with respect to sigma.
     length : float
-        Range of sigma.
+        Range of sigma over which the polynomial extends.
     """
     from scipy.interpolate import BPoly
 
     ends = np.array([0.0, length])
     polynomial = BPoly.from_derivatives(ends, [start, end])
-    # A spline without inner knots has the same control points, and is evaluated faster.
+    # A spline without inner knots has the same control points as a Bernstein polynomial, and is evaluated faster.
     spline = Spline(np.repeat(ends, 8), polynomial.c[:, 0], 7)
     return SplineCurve(spline, length, ends)
 
@@ -76,7 +78,7 @@ class LineCurve:
     Attributes
     ----------
     start : ndarray, shape (m,)
-        Task coordinates at its start.
+        Task coordinates at the start of the line.
     slope : ndarray, shape (m,)
         Task coordinates per unit sigma. The norm is 1 in the position rows, or in the angle if the position stands
         still.
@@ -90,7 +92,7 @@ class LineCurve:
 
     @property
     def knots(self) -> Array:
-        """Start and end, because the line is analytic."""
+        """Start and end of the line, which is analytic in between."""
         return np.array([0.0, self.length])
 
     def derivatives(self, sigma: Array, order: int = 3) -> Array:
@@ -140,16 +142,16 @@ class ArcCurve:
     Attributes
     ----------
     center : ndarray, shape (m,)
-        Centre, m; for an angle its value at the start, rad.
+        Centre, m; in the row of an angle, the value at the start, rad.
     outward, forward : ndarray, shape (m,)
-        Vectors from the centre to the start, and in the direction of the turn there. Both have the length of the
-        radius, m.
+        Vectors from the centre to the start, and in the direction of the turn there. Both vectors have the length of
+        the radius, m.
     length : float
         Length of the curve, m.
     turn : float
-        Angle per unit sigma, rad/m.
+        Angle by which the curve turns per unit sigma, rad/m.
     slope : ndarray, shape (m,)
-        Climb along the axis per unit sigma; for an angle its slope, rad/m.
+        Climb along the axis per unit sigma; in the row of an angle, the slope of the angle, rad/m.
     """
 
     center: Array
@@ -167,7 +169,10 @@ class ArcCurve:
 
     @property
     def knots(self) -> Array:
-        """Every quarter turn. The arc is analytic, but a quadrature over many turns needs several intervals."""
+        """Values of sigma at every quarter turn.
+
+        The arc is analytic, but a quadrature over many turns needs several intervals.
+        """
         quarters = int(np.ceil(self.length * self.turn / (np.pi / 2)))
         return np.linspace(0.0, self.length, max(quarters, 1) + 1)
 
@@ -184,14 +189,14 @@ class ArcCurve:
 
 
 def _arc(center: Array, outward: Array, forward: Array, angle: float) -> ArcCurve:
-    """Return the arc through an angle, rad, without climb and without a row for an angle."""
+    """Return the arc that turns by an angle, rad, without climb and without a row for an angle."""
     radius = float(np.linalg.norm(outward))
     nothing = np.zeros_like(center)
     return ArcCurve(center, outward, forward, radius * angle, 1.0 / radius, nothing)
 
 
 def arc_center(shape: ArcCenter, context: SegmentContext) -> ArcCurve:
-    """Return the arc about a centre through an angle."""
+    """Return the arc that turns about a centre by an angle."""
     angle = float(np.deg2rad(shape.angle_deg))
     if abs(angle) < tolerances.LENGTH:
         raise context.zero_length(".angle_deg", shape.angle_deg)
@@ -205,7 +210,7 @@ def circle(shape: CircleTurns, context: SegmentContext) -> ArcCurve:
 
 
 def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
-    """Return the arc through one point to another.
+    """Return the arc that passes through one point and ends at another.
 
     The centre c is as far from the start p as from the two points p + a and p + b: ``a.(c - p) = a.a / 2``, and the
     same with b. For any number of rows, c - p is a linear combination of a and b.
@@ -230,7 +235,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
     to_center = np.linalg.solve(gram, np.diag(gram) / 2) @ sides
     outward = -to_center
     radius = np.linalg.norm(outward)
-    # An inversion about the start turns the circle into a line. In this direction, via comes before the end.
+    # An inversion about the start turns the circle into a line. Along this line, via comes before the end.
     forward = to_via / gram[0, 0] - to_end / gram[1, 1]
     forward -= (forward @ outward) / radius**2 * outward
     forward *= radius / np.linalg.norm(forward)
@@ -243,7 +248,7 @@ def arc_via(shape: ArcVia, context: SegmentContext) -> ArcCurve:
 def _about_center(
     shape: ArcCenter | CircleTurns | HelixTurns, angle: float, context: SegmentContext
 ) -> ArcCurve:
-    """Return the arc through a signed angle, rad, about the centre of a shape, without a row for an angle."""
+    """Return the arc that turns by a signed angle, rad, about the centre of a shape, without a row for an angle."""
     context.need_rows("an arc", 2, 3)
     center = context.coordinates(shape.center, "center", context.positions)
     outward = context.position - center
@@ -252,7 +257,7 @@ def _about_center(
             "the arc has too many turns for one path",
             found=f"{abs(angle) / (2.0 * np.pi):g} turns",
             allowed=f"at most {_MOST_TURNS}",
-            hint="Plan some turns, and repeat them (boundary.periodic)",
+            hint="Plan a few turns, and repeat them (boundary.periodic)",
         )
     if np.linalg.norm(outward) < tolerances.LENGTH:
         raise context.wrong(
@@ -289,18 +294,18 @@ def _normal(
             ".normal",
             found="no normal",
             allowed="the axis of rotation, [nx, ny, nz]",
-            hint="Or use via and to",
+            hint="Or define the arc with via and to",
         )
     unit = np.asarray(normal) / np.linalg.norm(normal)
     slope = unit @ outward / np.linalg.norm(outward)
-    largest = 1e-3  # coordinates are given with a few digits
+    largest = 1e-3  # coordinates are given with only a few digits
     if abs(slope) > largest:
         raise context.wrong(
             "the normal is not perpendicular to the radius from the centre to the segment's start",
             ".normal",
             found=f"{np.rad2deg(np.arccos(np.clip(slope, -1, 1))):.6g} degrees between them",
             allowed=f"90 degrees to within {np.rad2deg(largest):.2g}",
-            hint=f"Move the centre by {unit @ outward:.6g} m along the normal, or use via and to",
+            hint=f"Move the centre by {unit @ outward:.6g} m along the normal, or define the arc with via and to",
         )
     return unit
 
@@ -320,7 +325,7 @@ def _with_angle(arc: ArcCurve, turning: str, context: SegmentContext) -> ArcCurv
             sense = float(np.cross(*sides)[ANGLES.index(angle)] * arc.turn**2)
             if abs(sense) < 1.0 - tolerances.WRITTEN:
                 raise context.wrong(
-                    f"the arc is in another plane than that in which {angle} turns",
+                    f"the arc is not in the plane in which {angle} turns",
                     ".yaw",
                     found="tangent",
                     allowed="fixed",
@@ -347,7 +352,7 @@ def helix(shape: HelixTurns, context: SegmentContext) -> ArcCurve:
     """Return climbing turns about an axis."""
     context.need_rows("a helix", 3)
     arc = _about_center(shape, 2 * np.pi * shape.turns, context)
-    # The arc's normal has the sign of the turns.
+    # The sign of the turns determines the sign of the arc's normal.
     rise = shape.turns * shape.pitch * arc.normal
     length = float(np.hypot(arc.length, np.linalg.norm(rise)))
     turn = arc.turn * arc.length / length

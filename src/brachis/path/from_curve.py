@@ -1,4 +1,4 @@
-"""Segments from curves of other libraries; and speeds of the tool along a path from the feed rates of its points."""
+"""Segments from curves of other libraries, and speeds of the tool along a path from the feed rates of its points."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ def bspline_segment(
     ----------
     curve : scipy BSpline, PPoly, CubicSpline, ... or callable
         Piecewise polynomials of SciPy are converted exactly. Any other function ``curve(u)`` is called with single
-        numbers u in the interval, and returns values, (m,).
+        numbers u in the interval and must return values, (m,).
     interval : (float, float), optional
-        Range of u. Default for curves of SciPy: their own range. Required for a function.
+        Range of u, required for a function. For curves of SciPy, the default is the curve's own range.
     tolerance : float, optional
-        Largest distance between a function and the spline that replaces it, rad or m.
+        Maximum distance between a function and the spline that replaces it, rad or m.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def bspline_segment(
     ------
     InputError
         One of the first three derivatives jumps, a function is not smooth enough for the tolerance, or the interval or
-        the values are not valid.
+        the values are invalid.
 
     Examples
     --------
@@ -122,10 +122,10 @@ def _of_pieces(
 def _of_function(
     curve: Callable[[Any], Any], interval: tuple[float, float], tolerance: float
 ) -> BSpline:
-    """Fit a spline of degree 5 to a function, with more and more intervals, until it agrees in between as well."""
+    """Fit a spline of degree 5 to a function, with more and more intervals, until both agree between nodes as well."""
 
     def values(u: Array) -> Array:
-        """Return the function's values, (K, m), after a check."""
+        """Return the function's values, (K, m), after checking them."""
         points = np.array(
             [np.asarray(curve(float(number)), dtype=float) for number in u]
         )
@@ -149,7 +149,7 @@ def _of_function(
         where="curve",
         found=f"{miss:.3g} rad or m off with {count} intervals",
         allowed=f"{tolerance:g}",
-        hint="A path must be smooth to the third derivative; raise the tolerance if the function is rounded",
+        hint="A path must be smooth to the third derivative; raise the tolerance if the function's values are rounded",
     )
 
 
@@ -161,7 +161,8 @@ def _interpolate(
 ) -> BSpline:
     """Interpolate at the Greville abscissae, which is exact if the function is in the spline space.
 
-    Inner breaks are knots of this multiplicity. Default: the largest that leaves three continuous derivatives.
+    Inner breaks are knots of this multiplicity. Default: the largest multiplicity that leaves three continuous
+    derivatives.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -173,31 +174,31 @@ def _interpolate(
 
 
 def _rows(values: Array) -> Array:
-    """Return values with one row for each point, also for curves with one coordinate."""
+    """Return values with one row for each point, even for curves with only one coordinate."""
     return np.asarray(values, dtype=float).reshape(len(values), -1)
 
 
 def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ...]:
     """Return the speed tables of a task's segments along the path that was built from them, in order.
 
-    If the table of one segment reaches its end, and that of the next segment its beginning, they are joined over the
-    blend.
+    If the table of one segment reaches the segment's end, and the table of the next segment starts at its beginning,
+    the two tables are joined over the blend.
 
     Parameters
     ----------
     segments : sequence of Segment
-        Those of the task.
+        Segments of the task.
     path : Path
         The path that `build_path` built from them.
     """
     tables: list[Array] = []
-    goes_on = False  # whether the last table holds up to the end of its segment
+    goes_on = False  # whether the last table applies up to the end of its segment
     for (begin, end), span in zip(pairwise(path.breaks), path.spans, strict=True):
         if span.segment is None:
             continue
         segment = segments[span.segment]
         speeds = getattr(segment.shape, "speeds", ())
-        if getattr(segment, "speed", None):  # a process speed
+        if getattr(segment, "speed", None):  # the segment has a process speed
             speeds = ()
         for sigma, speed in map(np.transpose, speeds):
             at = np.unique(np.clip(sigma, span.first, span.last))

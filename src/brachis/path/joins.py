@@ -1,4 +1,4 @@
-"""Joins between curves of rows or of poses: whether the curves continue each other, and blends that round corners."""
+"""Joins between curves of rows or of poses: whether consecutive curves match, and blends that round corners."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from brachis.robot.task_map.protocol import joints_of, position_rows
 from brachis.task.points.units import quaternions_of
 
 _SHARPEST = np.radians(172.0)
-"""Largest corner that a blend rounds, rad: above 172.1 degrees, the blend of two lines is below its least speed."""
+"""Maximum corner that a blend can round, rad: above 172.1 degrees, the blend of two lines is too slow in the middle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +33,13 @@ class Join:
     Attributes
     ----------
     first, second : Curve
-        The curves that meet.
+        The two curves that meet at the join.
     index : int
         Index of the segment that ends.
     s : float
-        Path coordinate.
+        Path coordinate of the join.
     rows : tuple of str
-        Rows of the task space; for a pose its position rows.
+        Rows of the task space; for a pose, only the position rows.
     """
 
     first: Curve
@@ -50,7 +50,7 @@ class Join:
 
     @property
     def point(self) -> Array:
-        """Task coordinates, (m,); for a pose twelve."""
+        """Task coordinates of the join, (m,); twelve for a pose."""
         return self.second.derivatives(np.zeros(1), 0)[0, 0]
 
     @property
@@ -66,7 +66,7 @@ class Join:
 
     @property
     def positions(self) -> int:
-        """Number of position rows."""
+        """Number of position rows among `rows`."""
         return len(position_rows(self.rows))
 
     @property
@@ -81,7 +81,7 @@ class Join:
 
     @property
     def rounding(self) -> str:
-        """Setting that rounds the corner, if a blend can, or that stops at it."""
+        """Setting that rounds the corner, if a blend can do so, or that makes the tool stop there."""
         before, after = (side[1, : self.positions] for side in self.sides())
         if angle_between(before, after) > _SHARPEST:
             return self.stopping
@@ -89,7 +89,7 @@ class Join:
 
     @property
     def stopping(self) -> str:
-        """Setting that stops at the corner."""
+        """Setting that makes the tool stop at the corner."""
         return f"path[{self.index}].stop: true to stop there"
 
     @property
@@ -100,7 +100,7 @@ class Join:
     def wrong_blend(
         self, problem: str, found: str, allowed: str, hint: str | None
     ) -> PathError:
-        """Return the error that the corner cannot be rounded."""
+        """Return the error for a corner that cannot be rounded."""
         return PathError(
             problem,
             s_interval=(self.s, self.s),
@@ -112,7 +112,7 @@ class Join:
 
 
 class Kink(NamedTuple):
-    """A join where curves do not continue each other, with the jump in words, and advice."""
+    """A join where consecutive curves do not match, with the jump in words, and advice."""
 
     join: Join
     found: str
@@ -129,13 +129,13 @@ def find_joins(curves: Sequence[Curve], rows: tuple[str, ...]) -> list[Join]:
 
 
 def row_corner(join: Join) -> Kink | None:
-    """Return the kink between two curves of rows, or None if three derivatives are continuous."""
+    """Return the kink between two curves of rows, or None if the first three derivatives are continuous."""
     jump = _mismatch(join, *join.sides())
     return Kink(join, jump, f"Set {join.rounding}") if jump else None
 
 
 def _mismatch(join: Join, before: Array, after: Array) -> str | None:
-    """Describe the jump between derivatives, (4, m), or return None if three derivatives are continuous."""
+    """Describe the jump between derivatives, (4, m), or return None if the first three derivatives are continuous."""
     # The k-th derivative times length^(k - 1) is comparable with the speed, which is about 1.
     size = max(np.linalg.norm(before[1]), 1.0)
     jumps = (
@@ -150,7 +150,8 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
         speed, new_speed = (
             np.linalg.norm(derivatives[1]) for derivatives in (before, after)
         )
-        # Splines change their speed at joins; a rotation of the tangent by rounding is then not mentioned.
+        # The parameter's speed may change where splines join; rounding of the tangent's direction is then not
+        # mentioned.
         if corner > 0.01 * abs(new_speed - speed):
             moved = np.linalg.norm((after - before)[1, : join.positions])
             alone = "" if moved > tolerances.WRITTEN else f" in {join.rows[-1]} alone"
@@ -162,7 +163,7 @@ def _mismatch(join: Join, before: Array, after: Array) -> str | None:
 
 
 def refuse_corners(corners: Sequence[Kink | None]) -> None:
-    """Raise a `PathError` for the first corner, which also names the others; nothing without corners."""
+    """Raise a `PathError` for the first corner, and name the others in it; do nothing if there are no corners."""
     refused = [corner for corner in corners if corner is not None]
     if not refused:
         return
@@ -172,7 +173,7 @@ def refuse_corners(corners: Sequence[Kink | None]) -> None:
         "the path must be smooth to the third derivative",
         s_interval=(join.s, join.s),
         found=jump,
-        allowed="segments that continue each other",
+        allowed="consecutive segments that match up to the third derivative",
         where=join.where,
         hint=advice + (f"; likewise {further_keys}" if further_keys else ""),
     )
@@ -186,7 +187,7 @@ def angle_between(first: Array, second: Array) -> float:
 
 
 def pose_corner(join: Join) -> Kink | None:
-    """Return the kink between two curves of poses, or None if three derivatives are continuous."""
+    """Return the kink between two curves of poses, or None if the first three derivatives are continuous."""
     on_the_spot = [
         stands_still(curve, join.positions) for curve in (join.first, join.second)
     ]
@@ -208,7 +209,7 @@ def pose_corner(join: Join) -> Kink | None:
 
 
 def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str | None:
-    """Describe the jump in the rotation of the tool, or return None if three derivatives are continuous.
+    """Describe the jump in the rotation of the tool, or return None if the first three derivatives are continuous.
 
     Parameters
     ----------
@@ -216,7 +217,7 @@ def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str
     before, after : ndarray, shape (4, c)
         Derivatives of the coordinates of the pose with respect to sigma at the join.
     unit : str
-        Unit of sigma.
+        Unit of the curves' parameter sigma.
     """
     old, new = (angular_rates(derivatives) for derivatives in (before, after))
     jumps = np.linalg.norm(new - old, axis=1)
@@ -231,19 +232,20 @@ def _turning_mismatch(join: Join, before: Array, after: Array, unit: str) -> str
 
 
 def blend_rows(join: Join, size: float) -> Curve:
-    """Return the blend that replaces the last `size` of one curve and the first `size` of the next.
+    """Return the blend that replaces the last `size` of one curve and the first `size` of the next one.
 
     Parameters
     ----------
     join : Join
-        Where the curves meet.
+        Join where the curves meet.
     size : float
         Range of sigma that is replaced on each side, m.
 
     Raises
     ------
     PathError
-        The blend is longer than half of a neighbouring segment, it almost stops or reverses, or only an angle moves.
+        The blend is longer than half of a neighbouring segment, the tool would almost stop or reverse in it, or only an
+        angle moves.
     """
     _check_neighbours(join, size)
     return _blend(join, *join.sides(size))
@@ -252,7 +254,7 @@ def blend_rows(join: Join, size: float) -> Curve:
 def blend_poses(join: Join, size: float) -> Curve:
     """Return the blend that replaces the last `size` of one curve of poses and the first `size` of the next.
 
-    It is a polynomial of the position and the quaternion; the quaternion is then normalised. See `blend_rows`.
+    The blend is a polynomial of the position and the quaternion; the quaternion is then normalised. See `blend_rows`.
 
     Raises
     ------
@@ -275,7 +277,7 @@ def blend_poses(join: Join, size: float) -> Curve:
 
 
 def _check_neighbours(join: Join, size: float) -> None:
-    """Refuse a blend that is too long, or next to a curve on which the position stands still.
+    """Reject a blend that is too long, or that is next to a curve on which the position stands still.
 
     Raises
     ------
@@ -284,10 +286,10 @@ def _check_neighbours(join: Join, size: float) -> None:
     stated_size = f"{size:g} {join.unit}"
     if any(stands_still(curve, join.positions) for curve in (join.first, join.second)):
         raise join.wrong_blend(
-            "a blend needs motion of the position on both sides, and on one the tool turns on the spot",
+            "a blend needs motion of the position on both sides, but on one side the tool turns on the spot",
             stated_size,
             "no blend here",
-            "Turn the tool along a line, or stop there, with stop: true instead of the blend",
+            "Turn the tool along a line, or stop at the corner, with stop: true instead of the blend",
         )
     longest = join.shorter / 2 * (1.0 + tolerances.ROUNDING)
     if size > longest:
@@ -303,7 +305,8 @@ def _check_neighbours(join: Join, size: float) -> None:
 def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
     """Return the septic polynomial between derivatives, (4, m), after a check that the position does not stop.
 
-    Its length is the mean of the chord and of the polygon over the corner, which keeps the speed close to 1.
+    The length of the blend is the mean of the chord and of the polygon over the corner. This length keeps the speed
+    close to 1.
 
     Raises
     ------
@@ -318,13 +321,13 @@ def _blend(join: Join, start: Array, end: Array) -> SplineCurve:
     curve = septic(start, end, (chord + (before + after)) / 2)
     velocity = curve.derivatives(np.linspace(0.0, curve.length, 201), 1)[1]
     speed = np.linalg.norm(velocity[:, :rows], axis=1).min()
-    slowest = 0.2  # it is 1 on a line
+    slowest = 0.2  # the speed is 1 on a line
     if not speed > slowest:
         raise join.wrong_blend(
             "the corner is too sharp for a blend: the tool would almost stop and reverse",
             f"a smallest speed of {speed:.3g} relative to the segments",
             f"more than {slowest}",
-            "Turn in two corners, or by an arc; or stop at the corner, with stop: true instead of the blend",
+            "Divide the corner into two, or use an arc; or stop at the corner, with stop: true instead of the blend",
         )
     return curve
 
@@ -335,7 +338,7 @@ def _with_quaternion(pose: Array) -> Array:
 
 
 def _sign(join: Join, size: float) -> float:
-    """Return the sign for the quaternion at the end that continues the one at the start along both curves."""
+    """Return the sign that makes the quaternion at the end continue the one at the start along both curves."""
     steps = np.linspace(0.0, size, 9)
     poses = [
         join.first.derivatives(join.first.length - size + steps, 0)[0],

@@ -20,7 +20,7 @@ from brachis.task.messages import validate
 
 _KEY = "tool_limits.process_speed"
 _LEAD = 0.1
-"""Distance in which the tool reaches or leaves a speed, divided by that speed, s.
+"""Distance over which the tool reaches or leaves a speed, divided by that speed, s.
 
 With 0.05, the included SCARA does not reach 0.3 m/s. With 0.1, five included arms reach 0.02 and 0.3 m/s.
 """
@@ -28,14 +28,14 @@ With 0.05, the included SCARA does not reach 0.3 m/s. With 0.1, five included ar
 
 @dataclass(frozen=True)
 class Leg:
-    """A part of the path that is travelled without a break.
+    """A part of the path along which the tool does not stop.
 
     Attributes
     ----------
     begin, end : float
-        Path coordinates.
+        Path coordinates at which the leg begins and ends.
     speed : float or None
-        Given speed of the tool, m/s. None: as fast as the limits allow.
+        Given speed of the tool, m/s. With None, the leg is travelled as fast as the limits allow.
     stops : bool
         Whether the arm stops at the end of the leg; only for ends inside the path.
     dwell : float
@@ -50,12 +50,12 @@ class Leg:
 
 
 def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
-    """Return the legs of a task's path, in order, without gaps from s = 0 to 1.
+    """Return the legs of a task's path, in order and without gaps, from s = 0 to 1.
 
     Raises
     ------
     PathError
-        A process speed does not fit the task space, or the tool stands still where it should have one.
+        A process speed does not fit the task space, or the tool stands still where it should have a process speed.
     """
     sections = task.tool_limits.process_speed
     if sections:
@@ -73,24 +73,24 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
 
 
 def key_of_speed(section: ProcessSpeed, number: int, below: str) -> str:
-    """Return the key of a process speed for messages: that of its segment, or one `below` its index in the list."""
+    """Return the key of a process speed for messages: the key of its segment, or one `below` its index in the list."""
     if section.segment is not None:
         return f"path[{section.segment}].speed"
     return f"{_KEY}[{number}]{below}"
 
 
 def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
-    """Return the task with process speeds, including those of segments, restricted to where the tool can hold them.
+    """Return the task with all process speeds, including those of segments, restricted to where the tool can hold them.
 
-    Segments with the same speed form one part, with the blends between them. Parts are cut at stops. The speed changes
-    in leads: at stops, at ends of the path that are not passed at the part's speed, and where one part directly follows
-    another. Leads take up at most half of a part. In them the tool does not exceed the speed of the part, unless it
-    comes from, or continues at, a higher speed.
+    Adjacent segments with the same speed form one part, with the blends between them. Parts are cut at stops. The speed
+    changes in leads. There is a lead at every stop, at an end of the path that is not passed at the part's speed, and
+    where one part directly follows another. Leads take up at most half of a part. In a lead, the tool does not exceed
+    the speed of the part, unless it comes from, or continues at, a higher speed.
 
     Raises
     ------
     TaskError
-        Parts overlap, or a speed exceeds the largest speed of the tool.
+        Parts overlap, or a speed exceeds the maximum speed of the tool.
     """
     limits = task.tool_limits
     sections = [section for section in limits.process_speed if section.segment is None]
@@ -117,7 +117,7 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
             leads = np.divide(
                 lengths, [_tool_slope(task_map, between, s) for s in ends]
             ).tolist()
-            # Whether a shorter lead is enough is left to the planner.
+            # The planner finds out whether a shorter lead is enough.
             share = min(
                 1.0, 0.5 * (ends[1] - ends[0]) / max(sum(leads), tolerances.PATH)
             )
@@ -136,7 +136,10 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
 
 
 def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
-    """List the parts of the path whose segments have a speed; a blend has one if both sides have the same speed."""
+    """List the parts of the path that have a speed.
+
+    A blend has a speed if the segments on both sides have the same one.
+    """
     speeds = [getattr(segment, "speed", None) for segment in task.path]
     sections: list[ProcessSpeed] = []
     after = 0
@@ -155,20 +158,20 @@ def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
 
 
 def _snap(s: float, stops: Array) -> float:
-    """Return the stop at a path coordinate, to the precision of a file; the coordinate itself without a stop."""
+    """Return the stop at a path coordinate, to within the precision of a file; if there is none, the coordinate."""
     near = stops[np.abs(stops - s) <= tolerances.WRITTEN]
     return float(near[0]) if len(near) else s
 
 
 def _lead(speed: float, next_speed: float) -> float:
-    """Return the distance in which the tool changes from one speed to another, m."""
+    """Return the distance over which the tool changes from one speed to another, m."""
     if abs(speed - next_speed) <= tolerances.WRITTEN * speed:
         return 0.0
     return _LEAD * max(speed, next_speed)
 
 
 def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
-    """Return how far the tool moves per unit s, m; at least the length that counts as zero."""
+    """Return how far the tool moves per unit s, m, but at least the length that counts as zero."""
     velocity = tool_derivatives(task_map, path, np.array([s]))[0, 0]
     return max(float(np.linalg.norm(velocity)), tolerances.LENGTH)
 
@@ -181,7 +184,7 @@ def _speed_at_end(task: Task, task_map: TaskMap, path: Path, end: int) -> float:
 
 
 def _check_task_space(task_map: TaskMap) -> None:
-    """Refuse a task space in which the tool can move in other ways than along the path."""
+    """Reject a task space in which the tool can move in other ways than along the path."""
     if isinstance(task_map, JointSpace):
         return
     position = task_map_of(task_map.robot, "position")
@@ -193,7 +196,7 @@ def _check_task_space(task_map: TaskMap) -> None:
             "a process speed needs a path that prescribes the whole position of the tool",
             where=_KEY,
             found=f"task_space [{', '.join(task_map.rows)}], which leaves {' and '.join(free)} free",
-            allowed="a task space with all coordinates of the position in which the tool can move",
+            allowed="a task space that contains every position coordinate that the arm can move",
             hint="Set task_space: position, or tool_limits.speed instead",
         )
 
@@ -201,7 +204,7 @@ def _check_task_space(task_map: TaskMap) -> None:
 def _check_motion(
     task_map: TaskMap, path: Path, section: ProcessSpeed, number: int
 ) -> None:
-    """Refuse a part in which the tool stands still."""
+    """Reject a part of the path in which the tool stands still."""
     s = np.linspace(*section.s, 401)
     velocity = tool_derivatives(task_map, path.between(*section.s), s)[0]
     speeds = np.linalg.norm(velocity, axis=1)

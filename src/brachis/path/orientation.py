@@ -1,4 +1,4 @@
-"""Orientations along a segment: fixed, turning about a fixed axis, or turning with the tangent."""
+"""Orientations of the tool along a segment: fixed, turning about a fixed axis, or turning with the tangent."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 AMBIGUOUS = 1e-4
-"""An orientation this close to half a turn from another (rad) is ambiguous: rounding would decide which way to turn."""
+"""Tolerance, rad, within which a turn counts as a half turn: rounding would decide which way to turn."""
 
 
 def _about_axis(
@@ -45,7 +45,7 @@ class Turn:
     axis : ndarray, shape (3,)
         Unit vector of the axis, in the tool frame.
     angle : float
-        The angle, rad.
+        Angle of the turn, rad.
     smooth : bool
         Whether the turn begins and ends at rate zero.
     """
@@ -56,7 +56,7 @@ class Turn:
     smooth: bool
 
     def over(self, length: float) -> Orientation:
-        """Return the turn, spread over a range of sigma.
+        """Return the turn spread over a range of sigma of the given length.
 
         If the turn is smooth, its angle is the septic polynomial whose first three derivatives vanish at both ends,
         ``35 u^4 - 84 u^5 + 70 u^6 - 20 u^7`` times the angle, with ``u = sigma / length``.
@@ -116,9 +116,9 @@ def turn_between(
 
 
 def half_turn(key: str) -> PathError:
-    """Return the error that an orientation is half a turn away from the one before."""
+    """Return the error for an orientation that is half a turn away from the previous one."""
     return PathError(
-        "the orientation is half a turn away from the one before, so the direction of rotation is ambiguous",
+        "the orientation is half a turn away from the previous one, so the direction of rotation is ambiguous",
         found="180 degrees",
         allowed="less than 180 degrees",
         where=key,
@@ -157,9 +157,9 @@ def orientation_along(
     Parameters
     ----------
     mode : str, Rotate, TurnTo, AlongTangent, or None
-        What the task asks for.
+        Orientation as given in the task.
     curve : Curve
-        The segment's position, three columns.
+        Position of the tool along the segment, three columns.
     start : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
     key : str
@@ -204,7 +204,7 @@ def orientation_along(
             found=f"{np.rad2deg(np.arcsin(least)):.2g} degrees between them at {_place(curve, sigma)}",
             allowed="1 degree or more",
             where=key,
-            hint=f"Set {key}: {{tangent: {{up: [...]}}}} to a direction that the tangent does not take",
+            hint=f"Set {key}: {{tangent: {{up: [...]}}}} to a direction that the tangent does not come close to",
         )
     frame = _with_frame(curve, up, np.eye(3), np.zeros(1), 0)[0, 0]
     return partial(_with_frame, curve, up, frame.T @ start)

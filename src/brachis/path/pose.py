@@ -1,4 +1,4 @@
-"""Paths of poses, or of some rows of the position with the orientation: curves of their coordinates, and twists."""
+"""Paths of poses, or of orientations with some position rows: curves of their coordinates, and twists."""
 
 from __future__ import annotations
 
@@ -14,20 +14,19 @@ from brachis.path.rotations import angular_rates
 from brachis.path.sequence import Path
 
 LEAST_QUALITY = 0.5
-"""Quality of interpolated quaternions below which the tool turns very differently from the neighbouring
-orientations."""
+"""Quality of interpolated quaternions below which the tool turns very differently from the given orientations."""
 
 
 class PosePath(Path):
     """A path of poses whose samples have the body twist; see `brachis.path.protocol.PathSample`."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s; outside its ends the first or last piece is continued.
+        """Return the path at K values of s; outside the ends of the path, the first or last piece is continued.
 
         Parameters
         ----------
         s : array_like, shape (K,)
-            Path coordinates.
+            Path coordinates at which to sample.
         """
         derivatives = self.derivatives(s)
         return PathSample(derivatives[0], *body_twists(derivatives))
@@ -37,9 +36,10 @@ class OrientedPath(Path):
     """A path of rows of the position and the orientation whose samples have angular velocities in the world frame."""
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
-        """Return the path at K values of s, shape (K,); outside its ends the first or last piece is continued.
+        """Return the path at K values of s, shape (K,); outside its ends, the first or last piece is continued.
 
-        The angular velocity w along the tool's axes is R w in the world. Its derivatives are R w' and R (w'' + w x w').
+        The angular velocity w along the tool's axes is R w in the world. The derivatives of R w are R w' and R (w'' + w
+        x w').
         """
         derivatives = self.derivatives(s)
         velocity, rate, bend = angular_rates(derivatives)
@@ -62,9 +62,9 @@ def _with_orientation(orientation: Orientation, sigma: Array, position: Array) -
 def quaternion_curve(columns: Curve) -> MappedCurve:
     """Return the coordinates of a position and a quaternion; the quaternion need not have unit length.
 
-    The quaternion divided by its length is that of the orientation. The result does not depend on the choice of the
-    world frame or the tool frame: a different frame multiplies all quaternions by a unit quaternion, which commutes
-    with the division.
+    The quaternion divided by its length gives the orientation. The result does not depend on the choice of the world
+    frame or the tool frame: a different frame multiplies all quaternions by a unit quaternion, and this commutes with
+    the division.
 
     Parameters
     ----------
@@ -80,13 +80,13 @@ def _from_quaternions(_sigma: Array, columns: Array) -> Array:
 
 
 def least_quality(columns: Curve) -> tuple[float, float]:
-    """Return where the quaternions, the last four columns, have the lowest quality, and that quality.
+    """Return the sigma at which the quaternions, the last four columns, have the lowest quality, and this quality.
 
-    The quality of a quaternion is its length, or the reciprocal if the length is greater than 1.
+    The quality of a quaternion is its length, or the reciprocal of its length if the length is greater than 1.
     """
 
     def quality(sigma: Array) -> Array:
-        """Return the quality of the quaternions, (K,), 1 at unit length."""
+        """Return the quality of the quaternions, (K,); it is 1 at unit length."""
         quaternions = columns.derivatives(sigma, 0)[0, :, -4:]
         lengths = np.linalg.norm(quaternions, axis=1)
         return np.minimum(lengths, 1.0 / np.maximum(lengths, 1.0))
@@ -95,13 +95,13 @@ def least_quality(columns: Curve) -> tuple[float, float]:
 
 
 def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, float]:
-    """Return where a continuous function is smallest, and its value there.
+    """Return the sigma at which a continuous function is smallest, and its value there.
 
     Parameters
     ----------
     function : callable
-        Function with values of shape (K,) at K values of sigma. It is evaluated at 64 points between two knots, then as
-        often around the smallest value.
+        Function with values of shape (K,) at K values of sigma. The function is evaluated at 64 points between every
+        two knots, then at as many points around the smallest value.
     knots : ndarray, shape (n,)
         Values of sigma between which the function is smooth.
     """
@@ -116,7 +116,7 @@ def smallest(function: Callable[[Array], Array], knots: Array) -> tuple[float, f
 
 
 def rotations(coordinates: Array) -> Array:
-    """Return the rotation matrices (..., 3, 3) at the end of coordinates (..., c)."""
+    """Return the rotation matrices, (..., 3, 3), in the last nine of the coordinates, (..., c)."""
     return coordinates[..., -9:].reshape(*coordinates.shape[:-1], 3, 3)
 
 

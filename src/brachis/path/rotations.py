@@ -1,6 +1,6 @@
 """Rotations and quaternions (w, x, y, z), and exact derivatives of products, unit vectors and sines by Leibniz' rule.
 
-SciPy's rotations are imported only where they are used: the import takes a fifth of a second.
+SciPy's rotations are imported only where they are used, because the import takes a fifth of a second.
 
 A function of one parameter is given by its value and derivatives, along the first axis of an array of shape (order + 1,
 ...). Then ``f[1:]`` are the derivatives of f', and ``(f g)[k] = sum_i binomial(k, i) f[i] g[k - i]``.
@@ -31,14 +31,14 @@ def _leibniz(
 
 
 def product(first: Array, second: Array, how: str) -> Array:
-    """Return the derivatives of a product, as many as both factors have.
+    """Return as many derivatives of a product as are given of its factors.
 
     Parameters
     ----------
     first, second : ndarray, shape (order + 1, ...)
-        Derivatives of the factors.
+        Derivatives of the two factors.
     how : str
-        The product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
+        Rule for the product of two values, in the notation of `numpy.einsum`, for example ``"...ij,...j->...i"``.
     """
     orders = range(min(len(first), len(second)))
     multiply = partial(np.einsum, how)
@@ -48,7 +48,8 @@ def product(first: Array, second: Array, how: str) -> Array:
 def unit(vector: Array) -> Array:
     """Return the derivatives of a vector divided by its length, shape (order + 1, ..., n).
 
-    With the squared length n, ``y = n^(-1/2)`` solves ``n y' = -n' y / 2``. This gives one derivative after the other.
+    Let n be the squared length. Then ``y = n^(-1/2)`` solves ``n y' = -n' y / 2``, which gives one derivative after the
+    other.
     """
     squared = product(vector, vector, "...i,...i->...")
     inverse = np.zeros_like(squared)
@@ -78,7 +79,7 @@ def hat(vector: Array) -> Array:
 def quaternion_derivatives(pose: Array) -> Array:
     """Return the derivatives of a unit quaternion, (order + 1, 4), from those of a pose's coordinates, (order + 1, c).
 
-    With the angular velocity w in the turning frame, ``q' = q w / 2`` gives one derivative after the other.
+    Let w be the angular velocity in the turning frame. Then ``q' = q w / 2`` gives one derivative after the other.
     """
     result = np.zeros((len(pose), 4))
     result[0] = quaternions_of(rotation_of(pose[0, -9:].reshape(3, 3)))
@@ -99,7 +100,7 @@ def angular_rates(poses: Array) -> Array:
 
 
 def rotation_of(matrix: Array) -> Rotation:
-    """Return the rotation, or rotations, of matrices (..., 3, 3)."""
+    """Return the rotation or rotations given by matrices (..., 3, 3)."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(matrix)

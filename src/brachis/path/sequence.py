@@ -30,9 +30,9 @@ class PathFrame:
     Attributes
     ----------
     turn : (c, c) ndarray
-        Orthogonal matrix.
+        Orthogonal matrix that turns coordinates into the world frame.
     origin : (c,) ndarray
-        m, rad.
+        World coordinates of the frame's origin, m and rad.
     """
 
     turn: Array
@@ -45,7 +45,7 @@ class PathFrame:
         Raises
         ------
         PathError
-            The frame turns the path out of the line or plane of the rows.
+            The frame turns the path out of the line or plane that the rows span.
         """
         from scipy.linalg import block_diag
 
@@ -57,7 +57,7 @@ class PathFrame:
         turning: np.ndarray = np.eye(len(stays))
         if tuple(rows[-3:]) == TURN_ROWS:
             angle = np.zeros(9)
-            turning = np.kron(rotation, np.eye(3))  # of a matrix row by row
+            turning = np.kron(rotation, np.eye(3))  # the rotation matrix row by row
         if (
             np.abs(block @ block.T - np.eye(len(axes))).max(initial=0.0) > 1e-9
             or np.linalg.det(block) < 0.0
@@ -67,8 +67,8 @@ class PathFrame:
                 "the path's frame turns the path out of the rows of the task space",
                 where="path_frame",
                 found=f"rpy_deg {list(placement.rpy_deg)} with task_space [{', '.join(rows)}]",
-                allowed="a turn within these rows",
-                hint="Set task_space: position, or turn the frame only about the axis that leaves these rows in place",
+                allowed="a rotation that stays within these rows",
+                hint="Set task_space: position, or turn the frame only about an axis that keeps these rows",
             )
         origin = np.append(np.array(placement.xyz)[axes], angle)
         return cls(block_diag(block, turning), origin)
@@ -94,14 +94,14 @@ def integrate(function: Callable[[Array], Array], bounds: Array) -> Array:
 
 
 def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
-    """Return the length of a curve from its velocities, (K, p), at s, (K,); analytic between knots, (N + 1,)."""
+    """Return the length of a curve from its velocities, (K, p), at s, (K,), analytic between the knots, (N + 1,)."""
     lengths = integrate(lambda s: np.linalg.norm(velocity(s), axis=1), knots)
     return float(lengths.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class CurveSpan:
-    """The part of a curve between sigma = `first` and `last`, with the index of its segment; None for a blend."""
+    """The part of a curve between sigma = `first` and `last`, with the index of its segment (None for a blend)."""
 
     curve: Curve
     first: float
@@ -116,23 +116,23 @@ class CurveSpan:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A prescribed path: curves joined end to end. s is the sum of their parameters divided by `total`.
+    """A prescribed path: curves joined end to end. s is their cumulative parameter sigma divided by `total`.
 
     Attributes
     ----------
     spans : tuple of CurveSpan
         Parts of the segments' curves, and blends.
     breaks : (b + 1,) ndarray
-        Values of s where spans join, from 0 to 1; for a part of a path, from its begin to its end. There the path is
-        C3, except at its stops.
+        Values of s where spans join, from 0 to 1; for a part of a path, from where the part begins to where it ends. At
+        the breaks, the path is C3 except at its stops.
     total : float
-        Sum of the parameter ranges of the whole path, sigma per unit s.
+        Sum of the parameter ranges of all curves of the whole path; sigma per unit s.
     positions : int
-        Number of position rows.
+        Number of position rows among the coordinates.
     frame : PathFrame or None
-        Frame of the curves; None: the world.
+        Frame in which the curves are given; None means the world.
     stops : ndarray
-        Values of s at which the tool stops, where corners are allowed.
+        Values of s at which the tool stops; only there may the path have corners.
     """
 
     spans: tuple[CurveSpan, ...]
@@ -170,7 +170,7 @@ class Path:
 
     @property
     def knots(self) -> Array:
-        """Values of s between which the path is analytic, from its begin to its end, including the breaks."""
+        """Values of s between which the path is analytic, from its start to its end, including the breaks."""
         inner_knots = [self.breaks]
         for (begin, end), span in zip(pairwise(self.breaks), self.spans, strict=True):
             knots = begin + (span.curve.knots - span.first) / self.total
@@ -184,8 +184,8 @@ class Path:
     def between(self, begin: float, end: float) -> Self:
         """Return the part of the path from s = `begin` to `end`, with the same s.
 
-        Only the spans in between are sampled, so that the side is unambiguous at a corner. Outside its ends, the first
-        or last piece is continued.
+        Only the spans within this part are sampled, so that it is clear on which side of a corner a sample lies.
+        Outside the ends of the part, the first or last piece is continued.
         """
         inner = self.breaks[1:-1]
         is_after = inner > begin + tolerances.PATH
@@ -204,8 +204,8 @@ class Path:
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
 
-        Outside its ends, the formula of the first or last piece is continued, so that trial points of the optimiser
-        just outside have smooth derivatives. At a stop, the path is sampled as it is after the stop.
+        Outside the ends of the path, the formula of the first or last piece is continued, so that trial points of the
+        optimiser just outside have smooth derivatives. At a stop, the sample is that of the curve after the stop.
         """
         return PathSample(*self.derivatives(s))
 
@@ -236,9 +236,9 @@ class Path:
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
-    """Return how far the position moves per unit s, m; if it stands still, how far the angles turn, rad.
+    """Return how far the position moves per unit s, m, or, if it stands still, how far the angles turn, rad.
 
-    For a path of joints, it is the norm of their derivatives.
+    For a joint path, return the norm of the derivatives of the joint positions.
     """
     sizes = task_map.norms(path.sample(np.array([s])).xi)
     position, angle = (float(size[0]) for size in sizes)
@@ -248,8 +248,8 @@ def path_speed(task_map: TaskMap, path: Path, s: float) -> float:
 def tool_derivatives(task_map: TaskMap, path: Path, s: Array) -> Array:
     """Return the velocity of the tool frame's origin per unit s and its first two derivatives, (3, K, p), m.
 
-    They are for the p position rows, along the axes of the world, or along those of the tool frame for poses. For a
-    path of joints, p = 3.
+    The vectors have the p position rows, along the axes of the world or, for poses, of the tool frame. For a joint
+    path, p = 3.
     """
     sample = path.sample(s)
     if not isinstance(task_map, JointSpace):
@@ -275,7 +275,7 @@ def tool_distance(task_map: TaskMap, path: Path) -> float:
 
 
 def check_closed(task_map: TaskMap, path: Path) -> None:
-    """Refuse a path that is not closed, or whose first two derivatives differ at its ends.
+    """Reject a path that is not closed, or whose first two derivatives differ between its start and its end.
 
     Raises
     ------
@@ -284,7 +284,7 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
     ends = path.sample(np.array([0.0, 1.0]))
     gap = np.abs(task_map.difference(*ends.target))
     worst = np.argmax(gap)
-    largest = tolerances.WRITTEN  # of derivatives relative to their size
+    largest = tolerances.WRITTEN  # tolerance for derivatives, relative to their size
     if gap[worst] > largest:
         raise PathError(
             "the path does not close",
@@ -301,5 +301,5 @@ def check_closed(task_map: TaskMap, path: Path) -> None:
                 found=f"a jump of {jump:.3g} in {np.linalg.norm(derivative[0]):.3g} (by s)",
                 allowed="a path that continues where it closes, to the second derivative",
                 where="boundary.periodic",
-                hint="Begin within a segment, so that corners are blended",
+                hint="Begin the path within a segment, so that all corners are blended",
             )

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 START_TOLERANCE = 1e-4
-"""Largest distance between the start of a segment and the start that its waypoints expect, m and rad."""
+"""Maximum distance between the start of a segment and the start that its waypoints expect, m and rad."""
 
 
 def spline_through(
     shape: SplineThrough, context: SegmentContext
 ) -> SplineCurve | LineCurve:
-    """Return the smooth curve from the segment's start through waypoints; a line for a single waypoint."""
+    """Return the smooth curve from the segment's start through waypoints; for a single waypoint, it is a line."""
     if shape.orientations is not None:
         raise context.wrong(
             "orientations need a task space of poses",
@@ -51,18 +51,18 @@ def spline_through(
 def pose_spline(
     shape: SplineThrough, context: SegmentContext, rotation: Array
 ) -> MappedCurve:
-    """Return the smooth curve through poses; for a single pose, the line with a uniform turn.
+    """Return the smooth curve through poses; for a single pose, it is a line with a uniform turn.
 
     Position and quaternion form one natural quintic spline over the chord lengths of the positions, or over the angles
-    between the orientations if the position stands still. The signs of the quaternions are chosen so that neighbours
-    are close.
+    between the orientations if the position stands still. The signs of the quaternions are chosen so that successive
+    quaternions are close.
 
     Parameters
     ----------
     shape : SplineThrough
-        The waypoints, with orientations.
+        The waypoints of the segment, with orientations.
     context : SegmentContext
-        Place of the segment, in position rows.
+        Context of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 
@@ -95,7 +95,7 @@ def pose_spline(
     if least < LEAST_QUALITY:
         near = int(np.searchsorted(columns.knots, sigma)) - 1
         raise context.wrong(
-            "the orientations differ too much, over too short a distance, for a smooth curve through them",
+            "the orientations differ too much over too short a distance for a smooth curve through them",
             f".orientations[{max(near, 0)}]",
             found=f"quaternions interpolated with a quality of {least:.2g} out of 1",
             allowed=f"{LEAST_QUALITY} or more",
@@ -159,13 +159,14 @@ def _waypoints_of(shape: SplineThrough, context: SegmentContext) -> Array:
 def _repeats_start(steps: Array) -> bool:
     """Tell from the steps between the start and the waypoints, (n - 1,), whether the first waypoint is the start.
 
-    It is if it lies within the tolerance, and within 1 % of the distance to the next waypoint.
+    The waypoint counts as the start if its distance from the start is within the tolerance, and within 1 % of the
+    distance to the next waypoint.
     """
     return len(steps) > 1 and bool(is_repeated(steps, START_TOLERANCE)[0])
 
 
 def _check_start(key: str, off: Array, context: SegmentContext) -> None:
-    """Refuse a segment whose start differs from the expected start by `off`, m in position rows and rad in others.
+    """Reject a segment whose start differs from the expected start by `off`, m in position rows and rad in other rows.
 
     Raises
     ------
@@ -188,9 +189,9 @@ def _check_start(key: str, off: Array, context: SegmentContext) -> None:
 def _starts_elsewhere(
     context: SegmentContext, key: str, found: str, hint: str | None
 ) -> PathError:
-    """Return the error that a segment does not start where its waypoints expect, with a hint if there is one."""
+    """Return the error for a segment that does not start where its waypoints expect, with an optional hint."""
     return context.wrong(
-        "the segment starts elsewhere than its waypoints expect",
+        "the segment does not start where its waypoints expect",
         key,
         found=found,
         allowed=f"at most {START_TOLERANCE:g} m and rad off",
@@ -207,18 +208,18 @@ def _chord_knots(
     Parameters
     ----------
     chords : ndarray, shape (n - 1,)
-        Distances of successive waypoints, m.
+        Distances between successive waypoints, m.
     otherwise : ndarray, shape (n - 1,)
         Distances to use if all positions are the same, rad.
     shape : SplineThrough
-        The waypoints.
+        The waypoints of the segment.
     context : SegmentContext
-        Place of the segment.
+        Context of the segment.
 
     Raises
     ------
     PathError
-        Nothing moves, or a waypoint repeats the one before.
+        Nothing moves, or a waypoint repeats the previous one.
     """
     if np.all(chords < tolerances.LENGTH):
         chords = otherwise
@@ -231,11 +232,11 @@ def _chord_knots(
         i = int(np.argmax(repeats))
         repeated = i + len(shape.through) - len(chords)
         raise context.wrong(
-            "a waypoint repeats the one before",
+            "a waypoint repeats the previous one",
             f".through[{repeated}]",
             found=f"{list(shape.through[repeated])}, {chords[i]:.3g} (m or rad) away",
             allowed="waypoints that differ from their predecessors in the position rows",
-            hint="Remove one of both",
+            hint="Remove one of the two",
         )
     return sum_up(chords)
 
@@ -243,20 +244,21 @@ def _chord_knots(
 def _interpolate(knots: Array, waypoints: Array) -> SplineCurve | LineCurve:
     """Return the natural quintic spline, or the line, through waypoints of shape (n, m) at knots of shape (n,).
 
-    The spline is C4. Of all curves through the waypoints, it has the least integral of the squared third derivative.
-    Its third and fourth derivatives vanish at both ends. Through three waypoints it is a parabola.
+    The spline is C4. Of all curves through the waypoints, the spline has the least integral of the squared third
+    derivative. The third and fourth derivatives of the spline vanish at both ends. Through three waypoints, the spline
+    is a parabola.
 
     Raises
     ------
     PathError
-        The distances of the waypoints differ so much that no spline can be computed.
+        The distances between the waypoints differ so much that no spline can be computed.
     """
     if len(waypoints) == 2:
         slope = (waypoints[1] - waypoints[0]) / knots[1]
         return LineCurve(waypoints[0], slope, float(knots[1]))
     try:
         return SplineCurve(_natural(knots, waypoints), float(knots[-1]), knots)
-    except ValueError as error:  # knots that fall together, or singular equations
+    except ValueError as error:  # coincident knots, or singular equations
         distances = steps_of(waypoints)
         raise PathError(
             "no spline goes through the waypoints: their distances differ too much",
@@ -273,24 +275,24 @@ def _natural(knots: Array, waypoints: Array) -> Spline:
     # With a parameter in [0, 1], derivatives at the ends have the same magnitude as the values.
     unit = knots / knots[-1]
     if len(knots) == 3:
-        # The end conditions give a parabola, but as equations they lose digits if a chord is short.
+        # The end conditions define a parabola, but solving them as equations loses digits if a chord is short.
         spline = make_interp_spline(unit, waypoints, k=2, t=np.repeat([0.0, 1.0], 3))
     else:
         zero = np.zeros(waypoints.shape[1])
         ends = [(3, zero), (4, zero)]
-        # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+        # SciPy documents conditions on chosen derivatives, but its type stubs lack them.
         spline = make_interp_spline(unit, waypoints, k=5, bc_type=(ends, ends))  # type: ignore[arg-type]
     return Spline(spline.t * knots[-1], spline.c, spline.k)
 
 
 def bspline_curve(shape: BSplineCurve, context: SegmentContext) -> SplineCurve:
-    """Return the curve, moved to the segment's start; its shape does not change.
+    """Return the curve of a segment, moved to the segment's start without a change of shape.
 
     Raises
     ------
     PathError
         All control points are the same, they have the wrong number of coordinates, or the curve does not start where
-        the segment does.
+        the segment starts.
     """
     key = "control_points[0]"
     first = context.coordinates(shape.control_points[0], key, context.rows)
@@ -313,16 +315,16 @@ def pose_bspline(
     Parameters
     ----------
     shape : BSplineCurve
-        Control points with quaternions.
+        The curve's control points, with quaternions.
     context : SegmentContext
-        Place of the segment, in position rows.
+        Context of the segment, in position rows.
     rotation : ndarray, shape (3, 3)
         Rotation matrix of the tool at the segment's start.
 
     Raises
     ------
     PathError
-        The curve does not start where the segment does.
+        The curve does not start where the segment starts.
     """
     points = np.array(shape.control_points)
     first = points[0, -4:] / np.linalg.norm(points[0, -4:])
@@ -338,7 +340,7 @@ def pose_bspline(
 
 
 def _of_control_points(shape: BSplineCurve, points: Array) -> SplineCurve:
-    """Return the curve with control points, (n, m), beginning at sigma = 0."""
+    """Return the curve with these control points, (n, m), beginning at sigma = 0."""
     spline = Spline(np.array(shape.knots) - shape.knots[0], points, shape.degree)
     breaks = np.unique(spline.knots)
     return SplineCurve(spline, float(breaks[-1]), breaks)

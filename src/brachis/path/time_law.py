@@ -4,9 +4,9 @@ g(s) is the distance that the tool moves per unit s. t(s) is the integral of g /
 
     sdot = v / g,    sddot = -v^2 g' / g^3,    sdddot = v^3 (3 g'^2 - g g'') / g^5
 
-If g is constant, as on lines and circles, s(t) is linear. Otherwise it is a spline through (t(s), s) that is refined
-until the speed is correct in between as well. Its knots are double where the path is not analytic, so that it is C3
-there.
+If g is constant, as on lines and circles, s(t) is linear. Otherwise s(t) is a spline through points (t(s), s) that is
+refined until the speed is correct between these points as well. The knots of the spline are double where the path is
+not analytic, so that the spline is C3 there.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 DEGREE = 5
-"""Degree of the spline, if the law is not linear."""
+"""Degree of the spline, if the time law is not linear."""
 _ACCURACY = 2e-10
-"""Largest relative deviation from the speed, without the rounding of times."""
+"""Maximum relative deviation from the given speed, without the rounding of times."""
 _LEAST_ACCURACY = 1e-7
-"""The same including the rounding of times, which matters if the path turns within micrometres."""
+"""Maximum relative deviation including the rounding of times, which matters if the path turns within micrometres."""
 _MOST_INTERVALS = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class TimeLaw:
-    """The path coordinate over time on a leg with a given speed.
+    """The path coordinate as a function of time on a leg with a given speed.
 
     Attributes
     ----------
     duration : float
-        s.
+        Duration of the leg, s.
     spline : BSpline
-        s over t in [0, duration], s.
+        The path coordinate s over the time t in [0, duration], s.
     ends : (2, 4) ndarray
         s and its first three time derivatives, per second, at the beginning and at the end, without the error of the
         spline.
@@ -117,7 +117,7 @@ def time_law_of(leg: Leg, task_map: TaskMap, path: Path) -> TimeLaw | None:
 
 @dataclass(frozen=True, eq=False)
 class _ToolAlongPath:
-    """The distance that the tool moves along a part of a path, which it travels at a speed, m/s."""
+    """The distance that the tool moves along a part of a path that it travels at a given speed, m/s."""
 
     task_map: TaskMap
     path: Path
@@ -148,7 +148,7 @@ class _ToolAlongPath:
 def _interpolate(
     tool: _ToolAlongPath, breaks: Array, is_double: np.ndarray, ends: Array
 ) -> BSpline:
-    """Return the spline that interpolates s at the times of its Greville abscissae, with given rates at the ends.
+    """Return the spline that interpolates s at its Greville abscissae (times), with given rates at the ends.
 
     Parameters
     ----------
@@ -156,9 +156,9 @@ def _interpolate(
     breaks : (N + 1,) ndarray
         Path coordinates of the knots.
     is_double : (N + 1,) ndarray
-        Whether a knot occurs twice.
+        Whether each knot occurs twice.
     ends : (2, 4) ndarray
-        As in `TimeLaw`.
+        Values and rates of s at both ends, as in `TimeLaw`.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -173,7 +173,7 @@ def _interpolate(
     at_knots = times[np.searchsorted(every, knots)]
     at_sites = times[np.searchsorted(every, sites)]
     first, last = ([(1, rates[1]), (2, rates[2])] for rates in ends)
-    # The stubs do not know conditions on chosen derivatives, which SciPy documents.
+    # SciPy documents conditions on chosen derivatives, but its type stubs lack them.
     return make_interp_spline(
         at_sites,
         sites,
@@ -184,7 +184,7 @@ def _interpolate(
 
 
 def _deviations(tool: _ToolAlongPath, spline: BSpline) -> Array:
-    """Return the largest relative deviations from the speed between the knots, (N,)."""
+    """Return the largest relative deviation from the given speed in each knot interval, (N,)."""
     times = np.unique(spline.t)
     t = times[:-1, None] + np.diff(times)[:, None] * (np.arange(8) + 0.5) / 8
     s = spline(t.ravel())

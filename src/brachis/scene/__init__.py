@@ -1,4 +1,4 @@
-"""Bodies of the robot and of its surroundings, and the distances between them."""
+"""Bodies of the robot and of its surroundings, and the distances between these bodies."""
 
 from brachis.scene.build import MANY_POSTURES, find_never_free, scene_of
 from brachis.scene.scene import UNIT, ClosePairs, Scene

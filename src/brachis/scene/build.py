@@ -21,9 +21,9 @@ from brachis.task import Task
 from brachis.task.settings import place_frame
 
 _MOST_PAIRS = 4000
-"""Largest number of pairs of bodies in a plan: so many take 0.9 GB of memory and half a minute."""
+"""Maximum number of pairs of bodies in a plan: this number takes 0.9 GB of memory and half a minute."""
 _POSTURES = 100
-"""Number of random postures in which links that always touch are found."""
+"""Number of random postures used to find links that always touch."""
 
 
 def scene_of(robot: Robot, task: Task) -> Scene | None:
@@ -32,7 +32,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     Raises
     ------
     TaskError
-        A name is unknown; the robot has no collision geometry; a mesh, or a URDF of the scene, cannot be read.
+        A name is unknown; the robot has no collision geometry; or a mesh or a URDF of the scene cannot be read.
     UrdfError
         The collision geometry of a URDF cannot be read.
     """
@@ -59,7 +59,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
         solids += build_solids(body, frame)
     mounted = placement_matrix(robot.settings.mounting)
     hint = (
-        "Leave out bodies that the robot cannot reach, or join small ones in one mesh"
+        "Leave out bodies that the robot cannot reach, or join small bodies in one mesh"
     )
     problem = "the scene has too many bodies"
     check_most(len(solids), _MOST_PAIRS, "bodies", problem, "scene", hint)
@@ -77,7 +77,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     known = sorted({*tree.links, *(solid.name for solid in solids)})
     check_names("link or body", listed, known, "collisions.disable")
     disabled = {*map(frozenset, [*settings.disable, *_read_srdf(settings.srdf)])}
-    # Solids of the robot also have the names of their links; bodies of the scene only have their own names.
+    # A solid of the robot can also be given by the name of its link; a body of the scene only by its own name.
     names = [{solid.name, solid.link} for solid in robot_solids]
     names += [{solid.name} for solid in solids[len(robot_solids) :]]
     pairs = [
@@ -89,16 +89,16 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
             for pair in itertools.product(names[first], names[second])
         )
     ]
-    check_most(len(pairs), _MOST_PAIRS, "pairs that keep apart", problem, "scene", hint)
+    check_most(len(pairs), _MOST_PAIRS, "pairs to keep apart", problem, "scene", hint)
     numbers = np.reshape(pairs, (-1, 2)).astype(int)
     scene = Scene(tuple(solids), joints, placements, numbers, len(robot_solids))
     return scene.with_pairs(_find_hazards(scene, robot, tree, task))
 
 
 def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.ndarray:
-    """Select the pairs to check, (P,) bool: within the robot only those that do not belong together.
+    """Select the pairs to check, (P,) bool; within the robot, leave out pairs of links that may touch.
 
-    Links that are connected by a joint may touch. So may links that overlap in all of many random postures.
+    Links that are connected by a joint may touch, as may links that overlap in all of many random postures.
     """
     is_within = scene.pairs[:, 1] < scene.robot_count  # the robot's solids come first
     is_hazard = ~is_within
@@ -120,7 +120,7 @@ def _find_hazards(scene: Scene, robot: Robot, tree: UrdfTree, task: Task) -> np.
 def _always_closer(
     scene: Scene, robot: Robot, distance: float, count: int
 ) -> np.ndarray:
-    """Tell which pairs, (P,) bool, are closer than a distance, m, in all of `count` random postures."""
+    """Tell which pairs, (P,) bool, are closer than a distance, m, in all `count` random postures."""
     ends = robot.limits.both_ways("position")
     half = np.where(robot.revolute, np.pi, 1.0)  # rad or m, for joints without an end
     low, high = np.where(np.isfinite(ends), ends, [-half, half])
@@ -130,11 +130,11 @@ def _always_closer(
 
 
 MANY_POSTURES = 2000
-"""Number of random postures for pairs that are never free: a pair that is free in 1 % of them is not missed."""
+"""Number of random postures used to find pairs that are never clear: a pair clear in 1 % of postures is recognised."""
 
 
 def find_never_free(scene: Scene, robot: Robot, clearance: float) -> Scene:
-    """Keep only the pairs that violate the clearance, m, in all of `MANY_POSTURES` random postures."""
+    """Return the scene with only those pairs that violate the clearance, m, in all `MANY_POSTURES` random postures."""
     suspects = scene.with_pairs(_always_closer(scene, robot, clearance, _POSTURES))
     return suspects.with_pairs(
         _always_closer(suspects, robot, clearance, MANY_POSTURES)

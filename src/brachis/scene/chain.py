@@ -1,4 +1,4 @@
-"""Placements of a robot's joints in many postures at once, and the motion of points on them."""
+"""Placements of a robot's joints in many postures at once, and the motion of points fixed to the joints."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Chain:
         return cls(np.array(placements), axes, np.any(turning, axis=1))
 
     def place(self, q: np.ndarray) -> Placed:
-        """Place the joints in postures, (K, n)."""
+        """Compute the placements of the joints in postures, (K, n)."""
         count, n = q.shape
         rotations = np.empty((count, n + 1, 3, 3))
         origins = np.empty((count, n + 1, 3))
@@ -69,14 +69,14 @@ class Chain:
         points: np.ndarray,
         directions: np.ndarray,
     ) -> np.ndarray:
-        """Differentiate the positions of points on joints, along directions, with respect to q, (M, n).
+        """Differentiate the positions of points on joints, along given directions, with respect to q; return (M, n).
 
         Parameters
         ----------
         placed : Placed
             Placements of the joints in K postures.
         posture, joint : (M,) int ndarray
-            Index of the posture, and number of the joint that carries the point; 0 if none does.
+            Index of the posture, and number of the joint that carries the point; 0 if no joint carries it.
         points, directions : (M, 3) ndarray
             Points, m, and directions, both in the world frame.
         """

@@ -1,7 +1,7 @@
-"""The scene: solids on joints, the pairs of solids that must not touch, and the distances of pairs.
+"""The scene: solids carried by joints, the pairs of solids that must not touch, and the distances within pairs.
 
-Balls and boxes around the solids select close pairs. Only for these, Coal computes the signed distance and the two
-closest points.
+Balls and boxes around the solids are used to select close pairs. Only for these pairs, Coal computes the signed
+distance and the two closest points.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from brachis.scene.chain import Placed
 from brachis.scene.solids import Solid
 
 UNIT = 0.1
-"""Distance that corresponds to 1 in the values and ratios of limits, m."""
+"""Distance, m, that corresponds to 1 in the values and ratios of the distance limits."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosePairs:
-    """M pairs of solids that are close to each other in some postures.
+    """M pairs of solids; the two solids of each pair are close to each other in one posture.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class ClosePairs:
     distance : (M,) ndarray
         Distance, m; negative if the solids overlap.
     points : (M, 2, 3) ndarray
-        Closest points of both solids, in the world, m.
+        Closest points of the two solids, in the world frame, m.
     normal : (M, 3) ndarray
         Unit vector from the first solid to the second one.
     """
@@ -69,7 +69,7 @@ class Scene:
     robot_count: int
 
     def names(self, pair: int) -> str:
-        """Return the names of both solids of a pair."""
+        """Return the names of the two solids of a pair."""
         first, second = self.pairs[pair]
         return f"{self.solids[first].name} and {self.solids[second].name}"
 
@@ -98,7 +98,7 @@ class Scene:
         return centres + self.placements[:, :3, 3], radii
 
     def centres(self, placed: Placed) -> np.ndarray:
-        """Place the centres of the balls around the solids, (K, S, 3), m."""
+        """Compute the centres of the balls around the solids in the world, (K, S, 3), m."""
         rotations, origins = placed
         turned = np.einsum("ksij,sj->ksi", rotations[:, self.joints], self.balls[0])
         return turned + origins[:, self.joints]
@@ -131,7 +131,7 @@ class Scene:
         return middle, np.where(is_endless, np.inf, 0.5 * high - 0.5 * low)
 
     def _place(self, placed: Placed) -> Placed:
-        """Place the solids: rotations, (K, S, 3, 3), and origins, (K, S, 3), m."""
+        """Compute the placements of the solids: rotations, (K, S, 3, 3), and origins, (K, S, 3), m."""
         rotations = placed[0][:, self.joints]
         origins = np.einsum("ksij,sj->ksi", rotations, self.placements[:, :3, 3])
         turned = rotations @ self.placements[:, :3, :3]
@@ -158,7 +158,7 @@ class Scene:
     def _gaps(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
     ) -> np.ndarray:
-        """Return the gaps, (M,), m, between the boxes of pairs along the boxes' axes; no distance is smaller."""
+        """Return lower bounds on the distances, (M,), m: gaps between the boxes of each pair along the boxes' axes."""
         turned, origins = self._place(placed)
         middles, halves = self._boxes
         origins = origins + np.einsum("ksij,sj->ksi", turned, middles)
@@ -181,7 +181,7 @@ class Scene:
     def measure(
         self, placed: Placed, posture: np.ndarray, pair: np.ndarray
     ) -> ClosePairs:
-        """Compute the distances of M pairs, each in one of the postures of the placed joints."""
+        """Compute the distances of M pairs of solids, each pair in one of the postures of the placed joints."""
         count = len(posture)
         distance = np.empty(count)
         points = np.empty((count, 2, 3))
@@ -190,7 +190,8 @@ class Scene:
         first = coal.Transform3s()
         second = coal.Transform3s()
         request = coal.DistanceRequest()
-        # For solids that are apart, m. The depth of overlaps is less exact: Coal fails if more is required.
+        # Accuracy for solids that are apart, m. The depth of overlaps is less exact: Coal fails if more accuracy is
+        # required.
         request.gjk_tolerance = 1e-10
         request.gjk_max_iterations = 500
         result = coal.DistanceResult()

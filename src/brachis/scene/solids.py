@@ -1,4 +1,4 @@
-"""Solids: convex bodies of the scene and of a robot's links, from the task and from ``<collision>`` in the URDF.
+"""Solids: convex bodies of the scene, from the task, and of a robot's links, from ``<collision>`` in the URDF.
 
 A mesh is replaced by its convex hull.
 """
@@ -22,15 +22,18 @@ from brachis.robot.urdf_elements import Element, UrdfTree, end_of, numbers_of, r
 from brachis.task.scene import Round, SceneBody
 
 _LARGEST = 1e4
-"""Largest radius of a ball around a body, m. Distances from a rod of 100 km have errors above 0.1 mm, so that plans
-close to it remain unverified. Close to a rod of 10 km, plans are verified."""
+"""Maximum radius of a ball around a body, m.
+
+Distances from a rod of 100 km have errors above 0.1 mm, so plans close to such a rod cannot be verified. Close to a rod
+of 10 km, they can.
+"""
 _LARGEST_FILE = 32.0
-"""Largest size of a mesh file, MB: its hull takes 20 s and 0.8 GB of memory."""
+"""Maximum size of a mesh file, MB: computing the hull of such a file takes 20 s and 0.8 GB of memory."""
 _HULL = (True, "Qt")
-"""Arguments for the hull: keep the triangles; options of Qhull."""
+"""Arguments for computing the hull: whether to keep the triangles, and the options of Qhull."""
 _THICKNESS = 0.02
 """Radius of capsules along links, as a fraction of the total length of all links."""
-Geometry = Any  # coal comes without types
+Geometry = Any  # coal has no type annotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +71,13 @@ class Solid:
 
     @property
     def radius(self) -> float:
-        """Radius of a ball around the solid, m; infinite for a half-space."""
-        # Coal does not include the padding in the ball around a sphere.
+        """Radius of the ball around the solid, m; infinite for a half-space."""
+        # Coal leaves out the padding in the ball around a sphere.
         return self.geometry.aabb_radius + self.padding
 
 
 def build_solids(body: SceneBody, frame: np.ndarray) -> Iterator[Solid]:
-    """Build the solids of a body of the scene: one, or those of its URDF. `frame`, (4, 4), is the body's frame.
+    """Build the solids of a body of the scene: one solid, or all of its URDF. `frame`, (4, 4), is the body's frame.
 
     Raises
     ------
@@ -94,11 +97,11 @@ def build_solids(body: SceneBody, frame: np.ndarray) -> Iterator[Solid]:
         joint = tree.joints[tree.above[link]]
         if joint.get("type") != "fixed":
             raise TaskError(
-                "a joint of the cell moves",
+                "a joint of the cell can move",
                 where=where,
                 found=f"joint {joint.get('name')!r} of type {joint.get('type')}",
                 allowed="fixed joints",
-                hint="Fix the joint, or leave out what it moves",
+                hint="Fix the joint, or leave out the links that it moves",
             )
         placed[link] = placed[end_of(joint, "parent")] @ origin_of(joint, "origin")
     solids = list(read_solids(tree, path.absolute().parent, {}))
@@ -119,7 +122,7 @@ def _build_solid(body: SceneBody, frame: np.ndarray) -> Solid:
     shape = getattr(body, body.shape)
     placement = frame @ placement_matrix(body.placement)
     if body.half_space is not None:
-        # Its plane is given in the world frame.
+        # The plane of a half-space is given in the world frame.
         normal = frame[:3, :3] @ shape.normal / np.linalg.norm(shape.normal)
         geometry = coal.Halfspace(normal, shape.offset + normal @ frame[:3, 3])
         placement = np.eye(4)
@@ -161,7 +164,7 @@ def read_solids(
 
 
 def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Solid]:
-    """Build capsules from each link's joint to its child joints, with a fraction of all lengths as the radius."""
+    """Build capsules from each link's joint to its child joints; the radius is a fraction of the total length."""
     ends = [
         (end_of(joint, "parent"), origin_of(joint, "origin")[:3, 3])
         for joint in tree.joints.values()
@@ -182,7 +185,7 @@ def build_capsules(tree: UrdfTree, padding: Mapping[str, float]) -> Iterator[Sol
 
 
 def _geometry(collision: Element, folder: Path) -> Geometry:
-    """Read a ``<collision>``."""
+    """Read the geometry of a ``<collision>`` element."""
     known = (*_SHAPES, "mesh")
     shapes = [
         element
@@ -212,7 +215,7 @@ _SHAPES: dict[str, tuple[Any, tuple[str, ...], int]] = {
     "cylinder": (coal.Cylinder, ("radius", "length"), 2),
     "capsule": (coal.Capsule, ("radius", "length"), 2),
 }
-"""Shapes except meshes: the class, the attributes with lengths, and the total number of lengths."""
+"""For every shape except meshes: the class, the attributes that hold lengths, and the total number of lengths."""
 
 
 def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[float]:
@@ -232,7 +235,7 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
 
 
 def _check_size(geometry: Geometry, where: str, padding: float = 0.0) -> None:
-    """Refuse a body that is too large; an infinite half-space is allowed."""
+    """Reject a body that is too large; an infinite half-space is allowed."""
     geometry.computeLocalAABB()
     if not isinstance(geometry, coal.Halfspace):
         radius = geometry.aabb_radius + padding
@@ -244,7 +247,7 @@ def _hull(path: Path, scale: np.ndarray) -> Geometry:
     """Return the convex hull of a mesh file."""
     if not path.is_file():
         raise InputError("the mesh file does not exist", where=str(path))
-    hint = "Only its convex hull counts: reduce it to fewer triangles"
+    hint = "Only the mesh's convex hull is used: reduce the mesh to fewer triangles"
     size = path.stat().st_size / 1e6
     check_most(size, _LARGEST_FILE, "MB", "the mesh file is too large", str(path), hint)
     try:

@@ -1,4 +1,4 @@
-"""The trajectory: immutable, evaluated at any time, and saved with all data that a new verification needs."""
+"""The trajectory: immutable, evaluated at any time, and saved with all the data needed to verify it again."""
 
 from brachis.trajectory.phases import (
     PHASE_COLUMNS,

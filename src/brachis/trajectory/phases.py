@@ -1,9 +1,10 @@
-"""The phases of a motion: what each phase is, its curves, and how the curves are joined into one spline.
+"""The phases of a motion, their curves, and how the curves are joined into one spline.
 
 A motion is a list of phases. A phase ends where the tool stops, where a wait is over, and where a given speed begins or
-ends. In each phase the curves are B-splines over its own normalised time. One joined spline over the time of the whole
-motion has all their knots. Where phases meet, it has a knot degree + 1 times, so that the pieces on both sides share no
-control point. At such a knot the spline has the value after it.
+ends. In each phase, the curves are B-splines over the normalised time of this phase. The curves of all phases are
+joined into one spline over the time of the whole motion, which has all their knots. Where phases meet, a knot occurs
+degree + 1 times, so that the pieces on the two sides share no control point. At such a knot, the spline has the value
+just after it.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ class PhaseSpline(Summary):
     Attributes
     ----------
     t_end : float
-        Duration, s.
+        Duration of the phase, s.
     knots : (N + 2 d + 1,) ndarray
         Clamped knots in normalised time from 0 to 1.
     degree : int
         Degree d of the splines.
     control_points : (1 + r, N + d) ndarray
-        Control points of s, then of each redundant joint in chain order, or of the chart's sigma.
+        Control points of s, then of each redundant joint in chain order or of the coordinates sigma of the chart.
     """
 
     t_end: float
@@ -41,9 +42,9 @@ class PhaseSpline(Summary):
     control_points: np.ndarray
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the values of the curves and three time derivatives, (K, c) each, at times t, (K,), s.
+        """Return the values of the curves and their first three time derivatives, (K, c) each, at times t, (K,), s.
 
-        At a knot they are the values just after it.
+        At a knot, the values just after it are returned.
         """
         t_norm = np.clip(t / self.t_end, 0.0, 1.0)
         return tuple(
@@ -61,7 +62,7 @@ class PhaseSpline(Summary):
         return bisect(lambda t: self.at(t)[0][:, 0] < s, end)
 
     def wait(self, duration: float) -> PhaseSpline:
-        """Return constant curves that stay at the end of these for a duration, s."""
+        """Return constant curves that stay at the end of this phase for a duration, s."""
         knots = np.repeat([0.0, 1.0], self.degree + 1)
         points = np.repeat(self.control_points[:, -1:], self.degree + 1, axis=1)
         return PhaseSpline(duration, knots, self.degree, points)
@@ -69,12 +70,12 @@ class PhaseSpline(Summary):
 
 @dataclass(frozen=True)
 class MotionPhase:
-    """A phase of a motion: its times, its part of the path, and its given speed.
+    """A phase of a motion: its times, its part of the path, and the given speed, if any.
 
     Attributes
     ----------
     begin, end : float
-        Times at which it begins and ends, s.
+        Times at which the phase begins and ends, s.
     s_begin, s_end : float
         Path coordinates at these times.
     speed : float or None
@@ -82,7 +83,8 @@ class MotionPhase:
     is_dwell : bool
         Whether the arm waits at rest.
     leads : float
-        Length of the leads, in which the tool reaches and leaves the given speed, m. They are in the adjacent phases.
+        Length of the leads, in which the tool reaches and leaves the given speed, m. The leads belong to the adjacent
+        phases.
     """
 
     begin: float
@@ -138,7 +140,7 @@ def phase_rows(phases: Sequence[MotionPhase]) -> list[tuple[str, ...]]:
 
 
 def _write_s(s: float) -> str:
-    """Write a path coordinate. Rounding errors around zero are written as 0."""
+    """Write a path coordinate; a rounding error around zero is written as 0."""
     return f"{round(s, 12):.4g}"
 
 
@@ -164,6 +166,6 @@ def join_splines(splines: Sequence[PhaseSpline]) -> tuple[np.ndarray, np.ndarray
 
 
 def find_phase_knots(knots: np.ndarray, degree: int) -> np.ndarray:
-    """Find the index, (P + 1,), of the first of each degree + 1 equal knots in a joined knot vector."""
+    """Find the index, (P + 1,), of the first knot in each group of degree + 1 equal knots in a joined knot vector."""
     same = knots[degree:] == knots[: len(knots) - degree]
     return np.flatnonzero(same)

@@ -1,6 +1,7 @@
 """Joint motion as polynomials between nodes.
 
-The polynomials are quintic Hermite pieces in Bernstein form, each relative to its first node. Their jerk is stored too.
+The polynomials are quintic Hermite pieces in Bernstein form, each relative to its first node. The jerk of the pieces is
+stored too.
 
 Positions are of the order of 1 rad, and the second differences of the coefficients are divided by h^2. If the node's
 position were part of the coefficients, its rounding alone would cause an error of 1e-16 / h^2 in the acceleration,
@@ -12,10 +13,10 @@ With x = 2 u - 1, from -1 to 1 over a piece of length h, the jerk is j(x) = m + 
     a = 3 (qddot0 + qddot1) / h - 6 (qdot1 - qdot0) / h^2
     b = 60 miss / h^3,   miss = q1 - q0 - h / 2 (qdot0 + qdot1) + h^2 / 12 (qddot1 - qddot0)
 
-Positions affect only b. They are 64-bit numbers, so the travel q1 - q0 of a piece is known to eps |q| at best. Over
-0.1 ms this is a jerk of 0.02 rad/s^3, and over 1 us a jerk of 20,000 rad/s^3. A piece therefore gets the travel of the
-least |b| within this rounding: rounding errors are not read as jerk, and larger differences are used fully. This is the
-definition of the motion for everything that evaluates it, including the verification.
+Positions affect only b. Positions are 64-bit numbers, so the travel q1 - q0 of a piece has an error of at least eps
+|q|. Over 0.1 ms, this error corresponds to a jerk of 0.02 rad/s^3, and over 1 us to a jerk of 20,000 rad/s^3. Within
+this rounding error, a piece therefore gets the travel with the smallest |b|: rounding errors are not read as jerk, and
+larger differences are used fully. All code that evaluates the motion, including the verification, uses this definition.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Pieces:
     Attributes
     ----------
     c : (m + 1, L, n) ndarray
-        Bernstein coefficients.
+        Bernstein coefficients of the pieces.
     x : (L + 1,) ndarray
         Times at which the pieces begin and end, s.
     """
@@ -49,7 +50,7 @@ class Pieces:
         self.c.setflags(write=False)
 
     def __call__(self, t: ArrayLike, nu: int = 0) -> np.ndarray:
-        """Return values or derivatives of order `nu`, (..., n), at times t, (...), s; at a node the ones after it."""
+        """Return values or derivatives of order `nu`, (..., n), at times t, (...), s; at a node, just after it."""
         if nu > 0:
             return self.derivative(t, nu - 1)
         t = np.asarray(t, dtype=float)

@@ -13,9 +13,9 @@ from brachis.errors import InputError
 from brachis.task.fields import Model
 
 SMALLEST = 2e-7
-"""Smallest tolerance of a path, m and rad. Paths are not fitted more closely."""
+"""Minimum tolerance of a recovered path, m and rad. Paths are not fitted more closely than this."""
 LARGEST = 1e-3
-"""Largest tolerance of a path, m and rad. A path with a larger one is of no use."""
+"""Maximum tolerance of a recovered path, m and rad. A path with a larger tolerance is of no use."""
 
 
 def check_tolerance(tolerance: float) -> float:
@@ -37,7 +37,7 @@ def check_tolerance(tolerance: float) -> float:
 
 
 class StoredRecovery(Model, extra="ignore", strict=True):
-    """Entries of a result file for a motion that was not planned."""
+    """Entries of a result file for a motion that was not planned here."""
 
     source: str
     tolerance: float
@@ -48,20 +48,20 @@ class StoredRecovery(Model, extra="ignore", strict=True):
 
 @dataclass(frozen=True, eq=False)
 class Recovered:
-    """Origin of a motion that was not planned, and how its path was found.
+    """Origin of a motion that was not planned here, and how its path was recovered.
 
     Attributes
     ----------
     source : str
-        Name of the file.
+        Name of the file that the motion was read from.
     tolerance : float
-        Largest distance of the tool from the recovered path, m and rad.
+        Maximum distance of the tool from the recovered path, m and rad.
     told : tuple of str
-        Sentences that say what is known and what is unknown.
+        Sentences for the user that say what is known about the motion and what is not.
     rows : (K, 1 + n) ndarray
         Times, s, and joint positions, rad or m, as in the file. Read-only.
     error : (n,) ndarray
-        Largest error of these positions, rad or m. Read-only.
+        Largest possible error of these joint positions, rad or m. Read-only.
     """
 
     source: str
@@ -100,7 +100,7 @@ class Recovered:
         Raises
         ------
         InputError
-            The rows are not those of such a motion.
+            The data do not describe such a motion.
         """
         rows = numbers(stored.rows, "recovered.rows", "s, then rad or m")
         error = np.array(stored.error)

@@ -49,11 +49,11 @@ ARRAYS = (
 )
 """Names of the arrays in the file, as in `Trajectory`."""
 _MOST_BYTES = 128_000_000
-"""Largest size of a result file and of its unpacked content, bytes."""
+"""Maximum size of a result file and of its unpacked content, bytes."""
 _MOST_NODES = 500_000
-"""Largest number of nodes of a motion. It bounds the time that the verification takes."""
+"""Maximum number of nodes of a motion. This bounds the time that the verification takes."""
 _HIGHEST_DEGREE = 7
-"""Highest degree of splines, the same as in tasks."""
+"""Maximum degree of the splines, the same as in tasks."""
 _BROKEN = (
     OSError,
     ValueError,
@@ -68,11 +68,11 @@ _BROKEN = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""Errors that broken archives, array headers and JSON raise."""
+"""Errors raised when an archive, an array header or JSON is broken."""
 
 
 class _Meta(Model, extra="ignore", strict=True):
-    """Content of a result file besides its arrays."""
+    """Content of a result file, except its arrays."""
 
     task: dict[str, Any]
     urdf: str
@@ -99,7 +99,7 @@ def write_result(
         there are too many nodes.
     """
     check_suffix(
-        path, ".npz", "brachis.export.write writes tables and formats of controllers"
+        path, ".npz", "brachis.export.write writes tables and controller formats"
     )
     _check_nodes(arrays["times"])
     contents: dict[str, Any] = {
@@ -116,7 +116,7 @@ def read_result(path: Path) -> dict[str, Any]:
     Raises
     ------
     ResultFileError
-        The file is missing, broken or has another schema version, or its parts do not fit each other.
+        The file is missing, is broken or has an unknown schema version, or its parts do not fit each other.
     """
     check_kind(path, Kind.RESULT, ResultFileError)
     where = str(path)
@@ -154,7 +154,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 
 def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Read the metadata and the arrays, and check only their types."""
+    """Read the metadata and the arrays. Only the types of these parts are checked."""
     if not zipfile.is_zipfile(stream):
         raise ValueError("the file is not an npz archive")
     with zipfile.ZipFile(stream) as archive:
@@ -243,7 +243,7 @@ def _refuse_unless(
 
 
 def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
-    """Return the degree of redundancy, from a checked chart or else from the number of named joints."""
+    """Return the degree of redundancy, from the chart after checking it, or else from the number of named joints."""
     if rows.shape[:1] == (0,) and not knots.size:
         return named
     degree = 5
@@ -272,7 +272,7 @@ def _redundancy(rows: np.ndarray, knots: np.ndarray, n: int, named: int) -> int:
 
 
 def _are_knots(knots: np.ndarray, degree: int) -> bool:
-    """Return whether these are the knots of splines of a degree over [0, 1]."""
+    """Return whether these are the knots of splines of this degree over [0, 1]."""
     outer = degree + 1
     if not 1 <= degree <= _HIGHEST_DEGREE or knots.ndim != 1 or len(knots) < 2 * outer:
         return False
@@ -281,7 +281,10 @@ def _are_knots(knots: np.ndarray, degree: int) -> bool:
 
 
 def _check_arrays(arrays: dict[str, np.ndarray], n: int, r: int, degree: int) -> None:
-    """Check shapes and order. Pieces and intervals that are too short would be lost in rounding."""
+    """Check the shapes and the order of the arrays.
+
+    Pieces and intervals that are too short would be lost in rounding.
+    """
     times = arrays["times"]
     knots = arrays["knots"]
     shortest = tolerances.TIME
@@ -336,5 +339,5 @@ def _check_nodes(times: np.ndarray) -> None:
         "times",
         "the motion has too many nodes",
         times.size,
-        f"at most {_MOST_NODES}; import fewer rows, or a part of them",
+        f"at most {_MOST_NODES}; import fewer rows, or only a part of the motion",
     )

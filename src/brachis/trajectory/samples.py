@@ -23,22 +23,22 @@ COLUMNS = {"q": "q", "qd": "qdot", "qdd": "qddot", "tau": "tau"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Samples(Summary):
-    """A trajectory at K times; joints in chain order. The arrays are read-only.
+    """A trajectory sampled at K times, with the joints in chain order. The arrays are read-only.
 
     Attributes
     ----------
     t : (K,) ndarray
-        Times, s.
+        Times of the samples, s.
     s : (K,) ndarray
-        Path coordinate, dimensionless.
+        Path coordinates, dimensionless.
     q, qdot, qddot : (K, n) ndarray
-        Position (rad or m), velocity, acceleration.
+        Joint positions (rad or m), velocities and accelerations.
     tau : (K, n) ndarray or None
-        Torque (Nm or N); None if the URDF has no masses.
+        Joint torques (Nm or N); None if the URDF has no masses.
     tool_position : (K, 3) ndarray
         Position of the tool frame in the world, m.
     tool_quaternion : (K, 4) ndarray
-        Orientation of the tool frame, w, x, y, z, with signs chosen so that neighbours are close.
+        Orientation of the tool frame, w, x, y, z, with signs chosen so that successive quaternions are close.
     tool_speed : (K,) ndarray
         Speed of the tool frame's origin, m/s.
 
@@ -67,7 +67,7 @@ class Samples(Summary):
 
     @property
     def columns(self) -> dict[str, str]:
-        """Entries of `COLUMNS` whose quantities are known."""
+        """Entries of `COLUMNS` whose quantities are known for these samples."""
         return {
             prefix: quantity
             for prefix, quantity in COLUMNS.items()
@@ -79,7 +79,7 @@ class Samples(Summary):
         return len(self.t)
 
     def joint_columns(self, joint_names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_`` and ``tau_`` with every joint's name.
+        """Return the columns, (K,), of a table by name: ``q_``, ``qd_``, ``qdd_`` and ``tau_`` plus a joint's name.
 
         Torques are left out if they are unknown.
         """
@@ -119,7 +119,7 @@ class Samples(Summary):
 def tool_motion(
     robot: Robot, q: np.ndarray, qdot: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return pose and speed of the tool frame in the world. Virtual joints do not move it.
+    """Return the pose and the speed of the tool frame in the world. Virtual joints do not move this frame.
 
     Parameters
     ----------
@@ -129,9 +129,9 @@ def tool_motion(
     Returns
     -------
     position : (K, 3) ndarray
-        Positions, m.
+        Positions of the tool frame, m.
     quaternion : (K, 4) ndarray
-        Unit quaternions w, x, y, z, with signs chosen so that neighbours are close.
+        Unit quaternions w, x, y, z, with signs chosen so that successive quaternions are close.
     speed : (K,) ndarray
         Speeds of the frame's origin, m/s.
     """

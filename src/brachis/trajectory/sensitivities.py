@@ -10,11 +10,11 @@ from brachis.common.labels import Label
 from brachis.common.summary import Summary
 
 TIMINGS = "timings"
-"""Source of sensitivities that come from timings of the joint path instead of multipliers."""
+"""Value of `source` for sensitivities that come from timings of the joint path instead of multipliers."""
 Accuracy = Literal["exact", "estimate", "least", "bound"]
 """Accuracy of a predicted saving; see `TaskSaving`."""
 STATIONARY = 1e-3
-"""Largest fraction of the gradient that may be unbalanced at an optimum."""
+"""Maximum fraction of the gradient that may remain unbalanced at an optimum."""
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,17 @@ class Sensitivity:
     Attributes
     ----------
     label : Label
-        What is limited, and the unit of the figure.
+        Label of the limited quantity, with the unit of the figure.
     side : {"lower", "upper"} or None
-        End of a range; None for a figure that bounds both sides.
+        End of a range that the figure sets; None for a figure that bounds both sides.
     figure : float
         Value of the limit in the label's unit.
     full_scale : float
-        Change of the figure by 100 %: for most limits the figure itself, for a position the width of its range.
+        Change of the figure that counts as 100 %: for most limits the figure itself, for a position the width of its
+        range.
     derivative : float
-        Derivative of t_E with respect to the figure, s per unit. It is <= 0, except at a lower end, where a larger
-        figure leaves less room.
+        Derivative of the end time t_E with respect to the figure, s per unit. The derivative is <= 0, except at a lower
+        end, where a larger figure leaves less room.
     s : tuple of (float, float)
         Intervals of the path coordinate in which the figure applies; empty for the whole path.
     """
@@ -47,11 +48,11 @@ class Sensitivity:
 
     @property
     def outwards(self) -> float:
-        """Sign of a change of the figure that leaves more room."""
+        """Sign of a change of the figure that gives the motion more room."""
         return -1.0 if self.side == "lower" else 1.0
 
     def change(self, fraction: float) -> float:
-        """Predict the change of t_E, s, if the limit is relaxed by a fraction of its full scale; 0.01 is 1 %."""
+        """Predict the change of the end time, s, if the limit is relaxed by a fraction of its full scale."""
         return self.outwards * self.derivative * self.full_scale * fraction
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,10 +80,9 @@ class TaskSaving:
     change : str
         The change in words, for example ``without the dwell at s = 0.3``.
     saved : float
-        Time saved, s.
+        Time that the change saves, s.
     accuracy : {"exact", "estimate", "least", "bound"}
-        Whether `saved` is exact, an estimate, the least that is saved (estimated), or the most that is saved along the
-        same joint path.
+        Whether `saved` is exact, an estimate, an estimated minimum, or an upper bound along the same joint path.
     """
 
     change: str
@@ -92,16 +92,16 @@ class TaskSaving:
 
 @dataclass(frozen=True)
 class BranchBoundary:
-    """The time that the boundary of the branch costs. It comes from the choice of redundant joints, not from the robot.
+    """The time that the boundary of the branch costs; the boundary depends on the redundant joints, not on the robot.
 
     Attributes
     ----------
     label : str
         Name of the branch margin.
     margin : float
-        Smallest branch margin that the program allows, dimensionless.
+        Minimum branch margin that the program allows, dimensionless.
     derivative : float
-        Derivative of t_E with respect to the margin, s.
+        Derivative of the end time t_E with respect to `margin`, s.
     """
 
     label: str
@@ -126,13 +126,15 @@ class Sensitivities(Summary):
     limits : tuple of Sensitivity
         All figures of limits (without safeguards), process speeds and blends. The costliest come first.
     boundaries : tuple of BranchBoundary
-        Branch margins that slow the motion down.
+        Costs of the branch margins that slow the motion down.
     source : str
         Origin of the multipliers, ``"solver"`` or ``"least squares"``; or ``"timings"`` if there are no multipliers.
     residual : float
-        Fraction of the gradient of t_E that the multipliers do not balance. It is 0 at an optimum.
+        Fraction of the gradient of the end time t_E that the multipliers do not balance. This fraction is 0 at an
+        optimum.
     unique : bool
-        False if the multipliers are not unique. The derivatives are then valid only for more room, not for less.
+        False if the multipliers are not unique. The derivatives are then valid only if a limit is relaxed, not if it is
+        tightened.
     task : tuple of TaskSaving
         Savings from changes of the task. The largest come first.
     """
@@ -146,7 +148,7 @@ class Sensitivities(Summary):
 
     @property
     def reliable(self) -> bool:
-        """Whether the multipliers show that the solution is an optimum; otherwise they are only approximate."""
+        """Whether the multipliers show that the solution is an optimum; if not, they are only approximate."""
         return self.residual <= STATIONARY
 
     def of(self, subject: str, kind: str, end: str | None = None) -> Sensitivity:
@@ -180,7 +182,7 @@ class Sensitivities(Summary):
         Raises
         ------
         ValidationError
-            The data are not valid. The error is that of pydantic.
+            The data are invalid. The error is raised by pydantic.
         """
         from pydantic import TypeAdapter
 

@@ -1,4 +1,4 @@
-"""Joint motion along a path, evaluated at any time; and reading it from a trajectory, a result, or a file."""
+"""Joint motion along a path, evaluated at any time; and how to obtain a trajectory from a result or a file."""
 
 from __future__ import annotations
 
@@ -35,17 +35,18 @@ if TYPE_CHECKING:
 
 
 CONTINUOUS_TORQUE = 3
-"""Lowest B-spline degree with continuous acceleration, and hence continuous torque."""
+"""Minimum B-spline degree for continuous acceleration, and hence for continuous torque."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Summary):
     """Joint motion along a path.
 
-    Joint positions are quintic polynomials between nodes. They agree with the closed form to within 1e-11 rad or m, and
-    join with continuous position, velocity and (from degree 3 on) acceleration. The path coordinate and the redundant
-    joints are also stored as the B-splines that the optimiser found. In a chart, its measure sigma of the self-motion
-    takes the place of the redundant joints.
+    Joint positions are quintic polynomials between nodes. These polynomials agree with the closed form to within 1e-11
+    rad or m. Where the polynomials join, the position, the velocity and (from degree 3 on) the acceleration are
+    continuous. The path coordinate and the redundant joints are also stored as the B-splines that the optimiser found.
+    If the motion was planned in a chart, the chart's coordinates sigma of the self-motion take the place of the
+    redundant joints.
 
     Attributes
     ----------
@@ -59,29 +60,29 @@ class Trajectory(Summary):
     times : (L + 1,) ndarray
         Times of the nodes, from 0 to t_end, s.
     q, qdot, qddot : (L + 1, n) ndarray
-        Joint motion at the nodes.
+        Joint positions, velocities and accelerations at the nodes.
     qddot_before : (L + 1, n) ndarray
         Acceleration just before the nodes. It differs from `qddot` at knots of splines of degree 2.
     knots : ndarray
         B-spline knots in normalised time; N + 2 d + 1 for a single phase. A knot where phases meet occurs d + 1 times.
     degree : int
-        B-spline degree d.
+        Degree d of the B-splines.
     control_points : (1 + r, N + d) ndarray
-        Control points of s (dimensionless), then of each redundant joint (rad or m) in chain order, or of the chart's
-        sigma.
+        Control points of s (dimensionless), then of each redundant joint (rad or m) in chain order or of the chart's
+        coordinates sigma.
     phase_ends : (P,) ndarray
-        Ascending times at which the phases end, s. The last one is t_end. Most motions have one phase.
+        Ascending times at which the phases end, s. The last one is t_end. Most motions have only one phase.
     chart_rows : (B, r, n + 1) ndarray
         Coefficients of the chart in which the motion was planned, see `brachis.kinematics.ChartRows`. B = 0 if a closed
         form was used instead.
     chart_knots : ndarray
         Knots of the chart's splines; empty if the rows are constant (B = 1).
     recovered : Recovered or None
-        Origin of the motion, if it was not planned. Its path is then known only to a tolerance.
+        Origin of the motion if it was not planned here; its path is then known only to within a tolerance.
     own_limits : tuple of str
         Names of the user's own limits that were not part of the task. The limits themselves are not saved.
     sensitivities : Sensitivities or None
-        The time that limits, speeds and stops cost, if known from the plan.
+        The time that limits, speeds and stops cost; None if it is unknown.
 
     Examples
     --------
@@ -118,7 +119,7 @@ class Trajectory(Summary):
 
     @property
     def t_end(self) -> float:
-        """End time, s."""
+        """End time of the motion, s."""
         return float(self.times[-1])
 
     @property
@@ -133,7 +134,7 @@ class Trajectory(Summary):
 
     @property
     def redundancy(self) -> str:
-        """The redundant joints in words; for a chart, its coordinates of the self-motion."""
+        """The redundant joints in words or, for a chart, the number of its coordinates of the self-motion."""
         if self.redundant_joints or not self.chart_rows.size:
             return ", ".join(self.redundant_joints) or "none"
         return (
@@ -168,7 +169,7 @@ class Trajectory(Summary):
         return self._spline(self.control_points[1:].T)
 
     def _spline(self, control_points: np.ndarray) -> Spline:
-        """Make a spline over time in seconds. Its knots where phases meet are exactly the ends of the phases."""
+        """Make a spline over time in seconds. Knots where phases meet are exactly at the ends of the phases."""
         times = self.knots * self.phase_ends[-1]
         first = find_phase_knots(self.knots, self.degree)[1:]
         times[first[:, None] + np.arange(self.degree + 1)] = self.phase_ends[:, None]
@@ -176,7 +177,10 @@ class Trajectory(Summary):
 
     @cached_property
     def phase_splines(self) -> tuple[PhaseSpline, ...]:
-        """Curves of each phase: s, then the redundant joints or sigma. This undoes `join_splines`, up to rounding."""
+        """Curves of each phase: s, then the redundant joints or sigma.
+
+        These are the curves before `join_splines`, except for rounding.
+        """
         outer = self.degree + 1
         numbers = find_phase_knots(self.knots, self.degree)
         ends = np.append(0.0, self.phase_ends)
@@ -194,7 +198,7 @@ class Trajectory(Summary):
 
     @cached_property
     def phases(self) -> tuple[MotionPhase, ...]:
-        """The phases of the motion, each with its times, its part of the path, and its given speed."""
+        """The phases of the motion, each with its times, its part of the path, and the given speed, if any."""
         ends = [0.0, *self.phase_ends.tolist()]
         speeds = self.task.tool_limits.process_speed
         phases = []
@@ -202,7 +206,8 @@ class Trajectory(Summary):
         for (begin, end), spline in zip(times, self.phase_splines, strict=True):
             s_begin, s_end = spline.control_points[0, [0, -1]].tolist()
             is_dwell = s_begin == s_end
-            # A recorded motion has phases only between its stops, which are longer than the parts with a speed.
+            # The phases of a recorded motion are those between its stops, and are longer than the parts with a given
+            # speed.
             s = (s_begin, s_end)
             matching = (
                 (section.speed, is_dwell, section.lead_length)
@@ -220,7 +225,7 @@ class Trajectory(Summary):
         return np.where(times == self.t_end, end, self.path_spline(times))
 
     def position(self, t: ArrayLike) -> np.ndarray:
-        """Return joint positions at times `t`, rad or m: (n,) for a number, (K, n) for (K,) times.
+        """Return joint positions at times `t`, rad or m: shape (n,) for a number, (K, n) for K times.
 
         Raises
         ------
@@ -240,7 +245,7 @@ class Trajectory(Summary):
         return self.pieces(self._check_times(t), nu=2)
 
     def jerk(self, t: ArrayLike) -> np.ndarray:
-        """Return joint jerks, rad/s^3 or m/s^3, in the shape of `position`. At a node it is the value after it."""
+        """Return joint jerks, rad/s^3 or m/s^3, in the shape of `position`; at a node, the value just after it."""
         return self.jerk_pieces(self._check_times(t))
 
     def torque(self, t: ArrayLike) -> np.ndarray:
@@ -257,7 +262,7 @@ class Trajectory(Summary):
     def _samples(
         self, t: np.ndarray, within: np.ndarray, *, stops: bool = False
     ) -> Samples:
-        """Evaluate the motion at times `within`, labelled with times t; with `stops` the last sample is at rest."""
+        """Evaluate the motion at times `within`, labelled with times `t`; with `stops`, the last sample is at rest."""
         q = self.position(within)
         qdot = self.velocity(within)
         qddot = self.acceleration(within)
@@ -270,16 +275,16 @@ class Trajectory(Summary):
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
-        """Sample at a controller's rate.
+        """Sample the motion at a controller's rate.
 
         Parameters
         ----------
         dt : float
-            Period, s.
+            Sampling period, s.
         last : {"exact", "hold"}, optional
-            The last sample. ``exact``: it is at t_end, so that the last period may be shorter. ``hold``: it is at the
-            first multiple of `dt` at or after t_end, with the end posture held at rest. Velocity and acceleration are
-            then zero, and the torque is the holding torque.
+            Time of the last sample. ``exact``: the last sample is at t_end, so the last period may be shorter.
+            ``hold``: the last sample is at the first multiple of `dt` at or after t_end, with the end posture held at
+            rest. The velocity and the acceleration of this sample are zero, and its torque is the holding torque.
 
         Returns
         -------
@@ -292,7 +297,7 @@ class Trajectory(Summary):
             `dt` is not positive, or so small that there would be more than ten million samples; or `last` is ``hold``
             and the motion does not end at rest.
         UnknownNameError
-            `last` has another value.
+            `last` is neither ``exact`` nor ``hold``.
         """
         if last not in ("exact", "hold"):
             raise UnknownNameError("ending", last, ("exact", "hold"), where="last")
@@ -328,7 +333,7 @@ class Trajectory(Summary):
         Raises
         ------
         InputError
-            `dt` is not a usable period; or, as `NotInstalledError`, pandas is not installed.
+            `dt` is not a usable period; or pandas is not installed (`NotInstalledError`).
         """
         return self.sample(dt).to_dataframe(self.joint_names)
 
@@ -351,13 +356,13 @@ class Trajectory(Summary):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file with all the data needed to load and verify the trajectory.
 
-        The file is written under a temporary name and then renamed, so that an interrupted write leaves nothing behind.
-        An older result of the same name is replaced.
+        The file is written under a temporary name and then renamed, so that an interrupted write leaves no incomplete
+        file. An older result with the same name is replaced.
 
         Raises
         ------
         InputError
-            The suffix is not npz, the folder does not exist or cannot be written, or the file exists and is not a
+            The suffix is not npz, the folder does not exist or cannot be written to, or the file exists and is not a
             result.
         """
         meta = {
@@ -380,7 +385,7 @@ class Trajectory(Summary):
         Raises
         ------
         ResultFileError
-            The file is missing, broken or has another schema version, or its parts do not fit each other.
+            The file is missing, is broken or has an unknown schema version, or its parts do not fit each other.
         """
         return cls(**read_result(file_name(path, "path")))
 
@@ -420,14 +425,14 @@ MotionSource = Trajectory | HasMotion | str | os.PathLike[str]
 
 
 def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
-    """Return the trajectory of `source`, which is the argument `where` of a public function.
+    """Return the trajectory of `source`; `where` is the argument's name for messages.
 
     Raises
     ------
     ResultFileError
         The file is not a result file.
     InputError
-        `source` is neither a trajectory, a result nor a file.
+        `source` is not a trajectory, a result or a file.
     """
     if isinstance(source, Trajectory):
         return source
@@ -439,7 +444,7 @@ def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
             "this is not a motion",
             where=where,
             found=type(source).__name__,
-            allowed="a Trajectory, a Result, or the npz file of one",
+            allowed="a Trajectory, a Result, or the npz file of either",
         )
     return motion
 

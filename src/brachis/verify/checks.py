@@ -1,6 +1,6 @@
-"""Checks of everything except the path and the limits.
+"""All checks of the verification except those of the path and the limits.
 
-These are progress, ends, stops and dwells, given speeds of the tool, splines, and continuity.
+This module checks progress, ends, stops and dwells, given speeds of the tool, splines, and continuity.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from brachis.verify.motion import CheckedMotion, MotionStates, turns
 from brachis.verify.report import Check
 
 _DWELL = 1e-9
-"""Largest deviation of a dwell from the requested time, due to rounding, s."""
+"""Allowed deviation of a dwell from the requested time, due to rounding, s."""
 _SPEED = 1e-6
-"""Largest relative deviation from a given speed, due to rounding and to interpolation between nodes."""
+"""Allowed relative deviation from a given speed, due to rounding and to interpolation between nodes."""
 _RESOLUTION = 1e-3
-"""Unit in which deviations are searched. `worst_between` distinguishes values that differ by 5e-6 units."""
+"""Unit of the deviations passed to `worst_between`, which distinguishes values that differ by 5e-6 units."""
 
 
 def check_progress(motion: CheckedMotion) -> list[Check]:
     """Check that the path is travelled once, forwards, from its beginning to its end.
 
-    Between knots ds/dt is a polynomial, which is checked at both ends and at its extrema.
+    Between knots, ds/dt is a polynomial; it is checked at both ends and at its extrema.
     """
     trajectory = motion.trajectory
     allowed = motion.options.progress_tolerance
@@ -101,7 +101,7 @@ def check_ends(motion: CheckedMotion) -> list[Check]:
 def _check_speed(
     motion: CheckedMotion, name: str, task_speed: float, state: MotionStates
 ) -> list[Check]:
-    """Check that an end is passed at the speed that the task requires; with full rest it is constant there."""
+    """Check that an end is passed at the speed that the task requires, which with full rest must be constant there."""
     task_map = motion.task_map
     spline = motion.trajectory.path_spline
     time = state.t[0]
@@ -131,7 +131,7 @@ def _check_speed(
 def _move_onto(
     posture: np.ndarray, task_map: TaskMap, target: np.ndarray
 ) -> np.ndarray:
-    """Return the posture with the tool at the target, (1, c), that is closest to a given posture, (n,)."""
+    """Return the posture closest to a given one, (n,), that has the tool at the target, (1, c)."""
     miss = task_map.difference(target, task_map.values(posture[None]))[0]
     if np.abs(miss).max(initial=0.0) > tolerances.WRITTEN:
         return posture
@@ -176,7 +176,7 @@ def check_stops(motion: CheckedMotion) -> list[Check]:
 
 
 def check_rest(motion: CheckedMotion, title: str, states: MotionStates) -> list[Check]:
-    """Check the derivatives that vanish where the arm is at rest; `title` has a placeholder for their names."""
+    """Check that derivatives vanish where the arm is at rest; `title` has a placeholder for their names."""
     options = motion.options
     jerks = states.qdddot / (1.0 + np.abs(motion.pieces.jerk[[0, -1]]).max())
     derivatives = (
@@ -197,16 +197,16 @@ def check_rest(motion: CheckedMotion, title: str, states: MotionStates) -> list[
 
 
 def times_of_stops(motion: CheckedMotion) -> np.ndarray:
-    """Return the times at which phases end or begin at stops of the task, s."""
+    """Return the times, s, at which phases end or begin at stops of the task."""
     stops = [leg for leg in motion.legs if leg.stops]
     ends = [phase.end for leg in stops for phase in _phases_up_to(motion, leg)]
     return np.unique(ends)
 
 
 def check_process_speed(motion: CheckedMotion) -> list[Check]:
-    """Check that the tool has every given speed, and that each part with a given speed is a phase of the motion.
+    """Check that the tool moves at every given speed, and that each part with a given speed is a phase of the motion.
 
-    For a recorded motion only the speed is checked, because its phases are only those between its stops.
+    For a recorded motion, only the speed is checked, because its phases are those between its stops.
     """
     legs = [leg for leg in motion.legs if leg.speed is not None]
     if not legs:
@@ -244,7 +244,7 @@ def _worst_deviation(motion: CheckedMotion, leg: Leg) -> Worst:
 
 
 def _rows_within(motion: CheckedMotion, leg: Leg) -> tuple[float, float]:
-    """Return the times of the first and the last row of a recorded motion within a leg, s."""
+    """Return the times, s, of the first and the last row of a recorded motion within a leg."""
     times = motion.pieces.times
     index, u = motion.pieces.place_on_path(np.array([leg.begin, leg.end]))
     begin, end = times[index] + u * motion.pieces.lengths[index]
@@ -260,7 +260,7 @@ def _nearest_phase(motion: CheckedMotion, leg: Leg) -> MotionPhase:
 
 
 def _distance(phase: MotionPhase, leg: Leg) -> float:
-    """Return how far the ends of a phase are from those of a leg, as a difference of s."""
+    """Return how far the ends of a phase are from the ends of a leg, as a difference of s."""
     return max(abs(phase.s_begin - leg.begin), abs(phase.s_end - leg.end))
 
 
@@ -287,9 +287,9 @@ def check_joints(
     kind: str,
     allowed: float,
 ) -> Check:
-    """Check the largest size of values, (K, n), and name its joint and time.
+    """Check the largest magnitude of values, (K, n), and name its joint and time.
 
-    `kind` is a key of `UNITS`, or the unit of all joints.
+    `kind` is a key of `UNITS`, or a unit that applies to all joints.
     """
     if not len(times):
         return Check(name, np.inf, allowed, "relative")
@@ -303,7 +303,7 @@ def check_joints(
 
 
 def check_splines(motion: CheckedMotion) -> list[Check]:
-    """Check that the splines of the redundant joints agree with the joints' motion."""
+    """Check that the splines of the redundant joints agree with the motion of these joints."""
     trajectory = motion.trajectory
     states = motion.states
     names = motion.robot.joint_names
@@ -318,10 +318,10 @@ def check_splines(motion: CheckedMotion) -> list[Check]:
 
 
 def check_continuity(motion: CheckedMotion) -> list[Check]:
-    """Check for jumps where polynomial pieces join, and at the seam between end and beginning of a periodic motion.
+    """Check for jumps where polynomial pieces join, and at the seam between the end and the start of a periodic motion.
 
-    Acceleration and torque may jump at stops, unless rest means that the acceleration vanishes. At the seam, a joint
-    without a range may have made whole turns.
+    Acceleration and torque may jump at stops, unless the task asks for zero acceleration there. At the seam, the
+    position of a joint without a range may differ by whole turns.
     """
     pieces = motion.pieces
     last = len(pieces.lengths) - 1
@@ -337,7 +337,7 @@ def check_continuity(motion: CheckedMotion) -> list[Check]:
     names = {"position": "q", "velocity": "qdot"}
     if (
         motion.trajectory.degree >= CONTINUOUS_TORQUE
-    ):  # with a lower degree they may jump
+    ):  # with a lower degree, acceleration and torque may jump
         names |= {"acceleration": "qddot"}
         names |= {"torque": "tau"} if motion.robot.has_masses else {}
     checks = []

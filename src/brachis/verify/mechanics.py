@@ -1,20 +1,20 @@
-"""Kinematics and torques from the text of the URDF, by Newton's and Euler's equations, joint by joint.
+"""Kinematics and torques from the text of the URDF, by the Newton-Euler equations, joint by joint.
 
-Each joint's frame is placed in the one before; vectors are in the joint's own frame. From the base outwards, with the
-vector p from the origin of the frame before, the joint's axis z, the angular velocity omega, the angular acceleration
-alpha and the acceleration a:
+Each joint's frame is placed in the previous joint's frame; vectors are in the joint's own frame. Let p be the vector
+from the origin of the previous frame, z the joint's axis, omega the angular velocity, alpha the angular acceleration
+and a the acceleration. From the base outwards:
 
     a' = a + alpha x p + omega x (omega x p)
     revolute     alpha' = alpha + z qddot + omega x z qdot,  omega' = omega + z qdot
     prismatic    a' = a' + 2 omega x z qdot + z qddot
 
-The recursion begins with a = -gravity. It returns to the base with the forces F = m a_com and the moments
-I alpha + omega x I omega of all bodies; the payload is a body of its own beside those of the URDF. The torque is the
-moment, or force, along z, and
+The recursion begins with a = -gravity. The recursion returns to the base with the forces F = m a_com and the moments I
+alpha + omega x I omega of all bodies; the payload is a separate body in addition to those of the URDF. The torque is
+the moment, or force, along z, and
 
     armature qddot + viscous qdot + coulomb tanh(qdot / v_eps).
 
-The rate of the torque is computed by differences along the motion, and that of the last three terms by their
+The rate of the torque is computed by finite differences along the motion, but for the last three terms by their
 derivatives.
 """
 
@@ -39,8 +39,8 @@ def tool_placements(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (K, 3), m, and rotations (K, 3, 3) of the tool frame, with its offset, in postures q (K, n).
 
-    If there are virtual joints, their positions are the deviation of the tool from the path, and the point on the path
-    is returned. `joints` are the `joint_placements`.
+    If there are virtual joints, their positions are the deviation of the tool from the path, and the corresponding
+    point on the path is returned. `joints` is the result of `joint_placements`.
     """
     origin, rotation = real_tool_placements(robot, *joints)
     count = len(robot.urdf_joints)
@@ -52,7 +52,7 @@ def tool_placements(
         away.get(f"tool_{direction}", still)
         for direction in ("x", "y", "z", "side", "lead", "roll")
     )
-    # The path's axes in the tool frame.
+    # The axes of the path in the tool frame.
     about_x, about_y, about_z = map(turns_about, np.eye(3), (side, -lead, -roll))
     rotation = rotation @ (about_z @ about_y @ about_x)
     return origin - np.einsum("kij,jk->ki", rotation, np.array([x, y, z])), rotation
@@ -94,7 +94,7 @@ def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def torques(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
 ) -> np.ndarray:
-    """Return joint torques (K, n), Nm or N, with zero for virtual joints; there are no columns without masses."""
+    """Return joint torques (K, n), Nm or N, zero for virtual joints; without masses, there are no columns."""
     if not robot.has_masses:
         return q[:, :0]
     f = robot.friction
@@ -109,10 +109,10 @@ def torques(
 def torque_rates(
     robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray, qdddot: np.ndarray
 ) -> np.ndarray:
-    """Return rates of the joint torques (K, n), Nm/s or N/s, by differences along the motion."""
+    """Return rates of the joint torques (K, n), Nm/s or N/s, by finite differences along the motion."""
 
     def rigid(*states: np.ndarray) -> tuple[np.ndarray]:
-        """Return the torques without friction at neighbouring instants, (2 K, n)."""
+        """Return the torques without armature and friction at neighbouring instants, (2 K, n)."""
         return (_rigid(robot, *states[:3]),)
 
     (rate,) = rates(rigid, (q, qdot, qddot, qdddot))
@@ -160,8 +160,8 @@ def tool_accelerations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return acceleration, m/s^2, and angular acceleration, rad/s^2, of the tool frame in its own axes, (3, K) each.
 
-    Virtual joints do not move the tool. If qdot is zero, accelerations depend on qddot as velocities do on qdot. So
-    passing zeros and qdot, in the places of qdot and qddot, gives the velocities.
+    Virtual joints do not move the tool. If qdot is zero, accelerations depend on qddot as velocities depend on qdot. To
+    get the velocities, pass zeros as qdot, and qdot as qddot.
     """
     motion = _motions(robot, q, qdot, qddot, np.zeros(3))[-1]
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
@@ -208,7 +208,7 @@ def _motions(
 
 
 def _carried_bodies(robot: Robot, joint: int) -> list[Body]:
-    """List the bodies that a joint carries: its own and, at the end of the chain, the payload."""
+    """List the bodies that a joint carries: those of its link and, at the end of the chain, the payload."""
     bodies = robot.urdf_dynamics.bodies
     body = bodies[joint]
     payload = robot.settings.payload
@@ -227,12 +227,12 @@ def _carried_bodies(robot: Robot, joint: int) -> list[Body]:
 def _accelerate(
     point: np.ndarray, omega: np.ndarray, alpha: np.ndarray, acceleration: np.ndarray
 ) -> np.ndarray:
-    """Compute the acceleration, (3, K), of a point that is fixed in a frame which moves with omega, alpha and a."""
+    """Compute the acceleration, (3, K), of a point fixed in a frame that moves with omega, alpha and a."""
     return acceleration + cross(alpha, point) + cross(omega, cross(omega, point))
 
 
 def _rotate(axis: np.ndarray, angles: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Rotate vectors (3, K) about a unit vector by angles (K,), rad (Rodrigues)."""
+    """Rotate vectors (3, K) about a unit vector by angles (K,), rad (Rodrigues' formula)."""
     along = axis[:, None]
     cosine = np.cos(angles)
     parallel = along * (axis @ vectors) * (1.0 - cosine)

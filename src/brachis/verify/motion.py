@@ -1,13 +1,12 @@
-"""The motion of a trajectory file, evaluated by polynomial piece and by the place u within the piece.
+"""The motion of a trajectory, evaluated by polynomial piece and by the place u within the piece.
 
-A piece of a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show where a
-motion reverses, peaks or crosses a value.
+A piece of only a microsecond is evaluated as exactly as any other. Roots of the polynomials, in Bernstein form, show
+where a motion reverses, peaks or crosses a value.
 
-A motion is checked in every piece, in every knot interval, in every piece of the path, and where joints reverse.
-
-Between checked instants anything could be hidden. Every quintic piece is therefore checked inside, however short it is,
-and more densely if it moves a joint further. Coulomb friction is checked within its own width wherever a joint reverses
-or nearly does.
+A motion is checked in every piece, in every knot interval, in every piece of the path, and where joints reverse. A
+violation could be hidden between checked instants. Every quintic piece is therefore checked inside, however short it
+is, and more densely if it moves a joint further. Wherever a joint reverses or almost reverses, the motion is also
+checked within the range of speeds over which Coulomb friction changes its sign.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ from brachis.verify.mechanics import joint_placements, torques
 from brachis.verify.report import VerifyOptions
 
 _HALVINGS = 30
-"""Number of halvings after which no part contains two roots, unless they are closer than `SAME_PLACE`."""
+"""Number of halvings after which no part contains two roots, unless the roots are closer than `SAME_PLACE`."""
 
 
 def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the places in (0, 1) at which polynomials change sign, and perhaps some at which they only touch zero.
+    """Find the places in (0, 1) where polynomials change sign; places where they only touch zero may be included.
 
     Parameters
     ----------
@@ -45,16 +44,16 @@ def roots(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     column : (Z,) int ndarray
-        Polynomial of each root, ascending.
+        Index of the polynomial of each root, ascending.
     u : (Z,) ndarray
-        Roots, ascending within a polynomial.
+        Roots, ascending within each polynomial.
     """
     column = np.arange(coefficients.shape[1])
     low = np.zeros(len(column))
     width = 1.0
     root_arrays = [(column[:0], low[:0])]
     for _ in range(_HALVINGS):
-        # Coefficients without a change of sign have no root.
+        # A polynomial whose coefficients do not change sign has no root.
         changing = (coefficients.min(axis=0) < 0.0) & (coefficients.max(axis=0) > 0.0)
         coefficients = coefficients[:, changing]
         column = np.tile(column[changing], 2)
@@ -100,17 +99,17 @@ def turns(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 SAME_PLACE = 1e-9
-"""Places in a piece that are closer to each other than this fraction of the piece count as the same."""
+"""Fraction of a piece; places in the piece that are closer to each other than this count as the same."""
 
 
 class MotionPieces:
-    """Joint motion as polynomials in Bernstein form over L pieces; u in [0, 1] is the place in a piece.
+    """Joint motion as polynomials in Bernstein form over L pieces; u in [0, 1] is the place within a piece.
 
     Parameters
     ----------
     trajectory : Trajectory
     robot : Robot
-        Robot that is verified.
+        Robot for which the motion is verified.
 
     Attributes
     ----------
@@ -144,7 +143,7 @@ class MotionPieces:
         self.robot = robot
 
     def time(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the times of places u in pieces, s."""
+        """Return the times, s, of places u in pieces."""
         return self.times[index] + u * self.lengths[index]
 
     def positions(self, index: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -152,7 +151,7 @@ class MotionPieces:
         return self.nodes[index] + bernstein(self.position, index, u)
 
     def place(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the piece and the place in it for times t, (K,), s. At a node this is the piece that begins there."""
+        """Return the piece and the place in it for times t, (K,), s; at a node, the piece that begins there."""
         index = np.searchsorted(self.times, t, side="right") - 1
         index = np.clip(index, 0, len(self.lengths) - 1)
         return index, np.clip((t - self.times[index]) / self.lengths[index], 0.0, 1.0)
@@ -165,14 +164,14 @@ class MotionPieces:
 
 @dataclass(frozen=True, eq=False)
 class MotionStates:
-    """The motion at K places, ascending in time, with both sides where pieces join. It is evaluated on demand.
+    """The motion at K places, ascending in time, evaluated on demand. Where pieces join, both sides are included.
 
     Attributes
     ----------
     pieces : MotionPieces
     index : (K,) int ndarray
     u, t, s : (K,) ndarray
-        Place in the piece with this index; time, s; path coordinate.
+        Place in the piece with this index; time, s; and path coordinate.
     q, qdot, qddot, qdddot, tau : (K, n) ndarray
     """
 
@@ -200,38 +199,38 @@ class MotionStates:
         )
 
     def split(self) -> Iterator[MotionStates]:
-        """Yield the states in parts that need little memory."""
+        """Yield the states in parts small enough to need little memory."""
         for begin in range(0, max(len(self.u), 1), _AT_ONCE):
             yield self.only(slice(begin, begin + _AT_ONCE))
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times, (K,), s."""
+        """Times of the states, (K,), s."""
         return self.pieces.time(self.index, self.u)
 
     @cached_property
     def s(self) -> np.ndarray:
-        """Path coordinates, (K,)."""
+        """Path coordinates of the states, (K,)."""
         return self.pieces.path_coordinate(self.t)
 
     @cached_property
     def q(self) -> np.ndarray:
-        """Positions, (K, n)."""
+        """Joint positions, (K, n)."""
         return self.pieces.positions(self.index, self.u)
 
     @cached_property
     def qdot(self) -> np.ndarray:
-        """Velocities, (K, n)."""
+        """Joint velocities, (K, n)."""
         return bernstein(self.pieces.velocity, self.index, self.u)
 
     @cached_property
     def qddot(self) -> np.ndarray:
-        """Accelerations, (K, n)."""
+        """Joint accelerations, (K, n)."""
         return bernstein(self.pieces.acceleration, self.index, self.u)
 
     @cached_property
     def qdddot(self) -> np.ndarray:
-        """Jerks, (K, n)."""
+        """Joint jerks, (K, n)."""
         return bernstein(self.pieces.jerk, self.index, self.u)
 
     @cached_property
@@ -241,7 +240,7 @@ class MotionStates:
 
     @cached_property
     def tau(self) -> np.ndarray:
-        """Torques, (K, n)."""
+        """Joint torques, (K, n)."""
         robot = self.pieces.robot
         return np.concatenate(
             [
@@ -251,7 +250,7 @@ class MotionStates:
         )
 
     def torque(self, robot: Robot) -> np.ndarray:
-        """Return torques of the verified robot, (K, n). The user's own limits call this."""
+        """Return the torques of the verified robot, (K, n). The user's own limits call this method."""
         robot.check_masses("torques")
         return self.tau
 
@@ -260,7 +259,7 @@ class MotionStates:
         return MotionStates(self.pieces, self.index[chosen], self.u[chosen])
 
     def merge(self, added: MotionStates) -> tuple[MotionStates, np.ndarray]:
-        """Return these states merged with others, ascending, and their order among the concatenated states."""
+        """Return these states merged with others, ascending in time, and their order among the concatenated states."""
         both = self.join([self, added])
         order = np.lexsort((both.u, both.index))
         return both.only(order), order
@@ -268,7 +267,7 @@ class MotionStates:
 
 @dataclass(frozen=True, eq=False)
 class CheckedMotion:
-    """A motion that is verified, with the data that it is verified against.
+    """A motion to verify, with the data against which it is verified.
 
     Attributes
     ----------
@@ -292,7 +291,7 @@ class CheckedMotion:
 
     @cached_property
     def pieces(self) -> MotionPieces:
-        """The joint motion."""
+        """The joint motion as polynomial pieces."""
         return MotionPieces(self.trajectory, self.robot)
 
     @cached_property
@@ -317,20 +316,20 @@ class CheckedMotion:
 
 
 MOST_INSTANTS = 2_000_000
-"""Largest number of instants at which a motion is checked, not counting those that limits add: about 10 s and 3 GB."""
+"""Maximum number of instants checked, not counting those that limits add: this takes about 10 s and 3 GB."""
 _USUAL_INSTANTS = 200_000
-"""Target for the number of instants in all knot intervals, unless each already has the minimum number."""
+"""Target for the total number of instants in all knot intervals; each still has at least its minimum number."""
 _AT_ONCE = 5000
-"""Number of instants that are evaluated at once, so that they stay in the processor's cache."""
+"""Number of instants that are evaluated at once, so that their data stay in the processor's cache."""
 _FEWEST = 8
 """Minimum number of steps in a knot interval, however many intervals there are."""
 _LEAST_STEPS = 3
-"""Minimum number of steps in each piece. Their ends determine a cubic acceleration."""
+"""Minimum number of steps in each piece. The ends of three steps determine a cubic acceleration."""
 _TRAVEL = 0.05
-"""Largest travel of a joint in a step, rad or m."""
+"""Maximum travel of a joint within a step, rad or m."""
 
 Places = tuple[np.ndarray, np.ndarray]
-"""Numbers of pieces, (K,), and places u in them, (K,)."""
+"""Indices of pieces, (K,), and places u in these pieces, (K,)."""
 
 
 def _all_places(motion: CheckedMotion) -> Places:
@@ -354,7 +353,7 @@ def _all_places(motion: CheckedMotion) -> Places:
 
 
 def _spread(motion: CheckedMotion) -> Places:
-    """Spread places over every piece, both ends included, as densely as knot intervals and joint travel require."""
+    """Spread places over every piece, including both ends, as densely as knot intervals and joint travel require."""
     pieces = motion.pieces
     trajectory = motion.trajectory
     knots = np.unique(trajectory.knots) * trajectory.t_end
@@ -380,7 +379,7 @@ def _spread(motion: CheckedMotion) -> Places:
 
 
 def list_speed_tables(task: Task) -> list[SpeedTable]:
-    """List the tool's speed limits that depend on s: those of the task, of feed rates, and of process-speed leads."""
+    """List the tool's speed limits that depend on s: those of the task, from feed rates, and in process-speed leads."""
     limits = task.tool_limits
     tables = [limits.speed] if isinstance(limits.speed, SpeedTable) else []
     leads = [lead for section in limits.process_speed for lead in section.leads]
@@ -401,7 +400,7 @@ def _check_count(count: int) -> None:
 
 
 def _path_coordinates(motion: CheckedMotion) -> np.ndarray:
-    """Spread s over every piece of the path, so that no small blend is skipped, and add the s of speed tables."""
+    """Spread s over every piece of the path, so that no small blend is skipped; add the s values of speed tables."""
     breaks = motion.path.breaks
     fractions = np.linspace(0.0, 1.0, motion.options.points_per_interval)
     _check_count(len(breaks) * len(fractions))
@@ -416,24 +415,25 @@ def _peaks(pieces: MotionPieces) -> Places:
         pieces.acceleration.max(axis=0) - ends.max(axis=0),
         ends.min(axis=0) - pieces.acceleration.min(axis=0),
     )
-    # Coefficients that leave the range of both ends by up to 1 % of the largest acceleration are ignored.
+    # Coefficients are ignored if they leave the range between the two ends by at most 1 % of the largest acceleration.
     index, joint = np.nonzero(beyond > 0.01 * np.abs(ends).max(axis=(0, 1)))
     turning, u, _ = turns(pieces.acceleration[:, index, joint])
     return index[turning], u
 
 
 def _reversals(pieces: MotionPieces) -> Places:
-    """Find where velocities of joints with Coulomb friction cross multiples of its width or turn close to zero."""
-    # At these speeds, in widths, friction rises from 29 % of its torque to all of it except a fraction of 2e-6.
+    """Find where velocities of joints with Coulomb friction cross multiples of its width or peak close to zero."""
+    # Speeds, in widths, at which friction rises from 29 % of its full torque to the full torque less a fraction of
+    # 2e-6.
     speeds = np.array([0.3, 1.0, 2.0, 3.0, 4.5, 7.0])
     levels = np.concatenate([-speeds[::-1], [0.0], speeds])
-    near = 10.0  # widths; an extremum at a lower speed is nearly a reversal
+    near = 10.0  # in widths; an extremum at a lower speed is almost a reversal
     friction = pieces.robot.friction
     rubbing = np.flatnonzero(friction.coulomb > 0.0)
     velocity = pieces.velocity[:, :, rubbing] / friction.v_eps[rubbing]
     lowest = velocity.min(axis=0)
     highest = velocity.max(axis=0)
-    # A joint at rest crosses zero only because of rounding.
+    # The velocity of a joint at rest crosses zero only because of rounding.
     moving = np.maximum(highest, -lowest) > speeds[0]
     index, joint = np.nonzero(moving & (lowest < near) & (highest > -near))
     slow = velocity[:, index, joint]

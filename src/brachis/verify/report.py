@@ -1,4 +1,4 @@
-"""The outcome of a verification as data, and the tolerances."""
+"""The results of a verification as data, and its tolerances."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from brachis.common.words import write_apart
 from brachis.robot.joints import shown_unit
 
 POSITION_SCALE = "0: the middle of the range, 1: an end"
-"""Remark of the position check, which explains its ratio."""
+"""Remark on the position check that explains its ratio."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The smallest value of a margin at the instants that were checked.
+    """The smallest value of a margin found at the checked instants.
 
     Attributes
     ----------
@@ -24,11 +24,11 @@ class Margin:
         Name of the margin.
     value : float
     unit : str
-        ``-`` or ``%``.
+        Unit of the value: ``-`` or ``%``.
     subject : str
-        The joint, or the arm, that has this margin.
+        The joint that has this margin, or the arm.
     time : float
-        Time at which it occurs, s.
+        Time at which the margin occurs, s.
     """
 
     name: str
@@ -54,9 +54,9 @@ class Check:
     value : float
         Worst value found: a ratio to the limit, or an error in `unit`.
     allowed : float
-        Largest value that passes.
+        Maximum value that passes.
     unit : str
-        ``-`` for ratios.
+        Unit of `value` and `allowed`; ``-`` for ratios.
     passed : bool
         Whether the value is at most the allowed one.
     subject : str or None
@@ -90,9 +90,9 @@ class Check:
         object.__setattr__(self, "passed", bool(self.value <= self.allowed))
 
     def figures(self, *, degrees: bool) -> tuple[str, str, str]:
-        """Write the value found, the allowed value, and their unit. Ratios to a limit have six decimals.
+        """Write the value found, the allowed value, and their unit. Ratios to a limit are written with six decimals.
 
-        With `degrees`, angles are in deg. A value that may be in rad or in m does not change.
+        With `degrees`, angles are in degrees, except values that may be either in rad or in m.
         """
         ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
         unit, factor = shown_unit(self.unit, degrees=degrees)
@@ -127,7 +127,7 @@ class Verification(Summary):
     worst_ratio : float
         Largest ratio of any quantity to its limit.
     path_error : float
-        Largest error of the path: the larger of the distance in m and the angle in rad.
+        Largest deviation from the path: the larger of the distance in m and the angle in rad.
     margins : tuple of Margin
         How close the motion comes to singular postures and to the ends of joint ranges.
 
@@ -177,25 +177,25 @@ class VerifyOptions:
     Attributes
     ----------
     ratio_tolerance : float
-        Largest excess over a limit, as a fraction of it.
+        Maximum excess over a limit, as a fraction of the limit.
     path_tolerance : float
-        Largest distance from the path, m or rad.
+        Maximum distance from the path, m or rad.
     points_per_interval : int
         Number of grid points per knot interval of the splines.
     progress_tolerance : float
-        Largest backward path velocity (1/s), and largest error of s at the ends (dimensionless).
+        Maximum backward path velocity (1/s), and maximum error of s at the ends (dimensionless).
     posture_tolerance : float
-        Largest error of the start and end postures, rad or m.
+        Maximum error of the start and end postures, rad or m.
     rest_velocity_tolerance : float
-        Largest joint velocity at the ends, rad/s or m/s.
+        Maximum joint velocity at the ends, rad/s or m/s.
     rest_acceleration_tolerance : float
-        Largest joint acceleration at the ends where the task asks for full rest, rad/s^2 or m/s^2.
+        Maximum joint acceleration at ends where the task asks for full rest, rad/s^2 or m/s^2.
     rest_jerk_tolerance : float
-        Largest joint jerk at the ends where the task asks for rest in jerk, as a fraction of 1 plus the largest jerk.
+        Maximum joint jerk at ends where the task asks for rest in jerk, as a fraction of 1 plus the largest jerk.
     jump_tolerance : float
-        Largest jump where polynomial pieces join, as a fraction of 1 plus the quantity's largest value.
+        Maximum jump where polynomial pieces join, as a fraction of 1 plus the largest value of the quantity.
     spline_tolerance : float
-        Largest difference between the redundant joints' splines and their motion, rad or m.
+        Maximum difference between the splines of the redundant joints and the motion of these joints, rad or m.
     """
 
     ratio_tolerance: float = 1e-4

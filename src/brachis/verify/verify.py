@@ -1,9 +1,9 @@
-"""Verification of a trajectory on a dense grid. It shares no code with the optimiser.
+"""Verification of a trajectory on a dense grid, which shares no code with the optimiser.
 
 Tool positions come from the saved joint polynomials and the kinematics of the URDF, and are compared with the path at
 the saved s(t). Torques come from Newton's and Euler's equations and from the friction formula, both implemented
 separately. Velocities and accelerations are derivatives of the polynomials. This verifies the motion that a controller
-would execute, not the optimiser's internal model of it.
+would execute, not the optimiser's internal model of the motion.
 """
 
 from __future__ import annotations
@@ -48,19 +48,19 @@ def verify_trajectory(
     Parameters
     ----------
     trajectory : Trajectory, Result or path
-        A motion, or its file.
+        The motion to verify, or the file of a result.
     options : VerifyOptions, optional
         Tolerances. By default, limits may be exceeded by the task's ``refinement.tolerance``.
     robot : Robot, optional
-        Robot to check against instead of the saved one, for example from a newer URDF. Its joints must have the same
-        names in the same order.
+        Robot to use instead of the saved one, for example from a newer URDF. Its joints must have the same names in the
+        same order.
     own_limits : sequence of LimitModel, optional
         The user's own limits with which the trajectory was planned, in addition to those that its task names.
 
     Returns
     -------
     Verification
-        It says whether the trajectory passed. A trajectory that fails raises no error.
+        All checks, and whether the trajectory passed. A trajectory that fails raises no error.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def verify_trajectory(
     motion = CheckedMotion(
         trajectory, robot, task_map, path_of(task_map, task), options
     )
-    # The motion is processed in parts, because the placements of all joints take much memory.
+    # The motion is processed in parts, because the placements of all joints take up much memory.
     surveys = [
         (
             path_errors(motion, states.q, states.s, states.joints),
@@ -144,16 +144,16 @@ def path_errors(
     s: np.ndarray,
     joints: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the larger of distance, m, and axis angle, rad, (K,), between the tool and the path at path coordinates.
+    """Return the larger of the distance, m, and the axis angle, rad, (K,), of the tool from the path at given s.
 
     Parameters
     ----------
     motion : CheckedMotion
     q : (K, n) ndarray
-        Postures, rad or m.
+        Postures of the robot, rad or m.
     s : (K,) ndarray
     joints : tuple
-        The `joint_placements` in these postures.
+        Result of `joint_placements` in these postures.
     """
     task_map = motion.task_map
     targets = motion.path.derivatives(np.clip(s, 0.0, 1.0), 0)[0]
@@ -165,7 +165,7 @@ def path_errors(
     if not task_map.angles:
         return distances
     if isinstance(task_map, RowsAndAngle):
-        # Compare in the plane, because the axes of rounded URDFs are slightly tilted.
+        # Compare in the plane, because the axes of URDFs with rounded figures are slightly tilted.
         axis = task_map.world_axis
         pointers = np.delete(rotations, axis, axis=1)[:, :, [task_map.tool_axis]]
         turned = turns_about(np.eye(3)[axis], targets[:, -1])
@@ -178,7 +178,7 @@ def path_errors(
 
 
 def _check_path(motion: CheckedMotion, errors: np.ndarray) -> Check:
-    """Check the largest of the tool's distances, (K,), from the path at the saved s(t)."""
+    """Check the tool's largest distance, out of (K,), from the path at the saved s(t)."""
     worst = np.argmax(errors)
     tolerance = motion.options.path_tolerance
     remark = ""

@@ -53,7 +53,7 @@ def test_a_saved_motion_is_solved_again_by_phase(stopping):
     again = brachis.bottleneck.report(
         stopping.trajectory, reference=True, listener=lines.append
     )
-    words = r"planning the motion again from itself: about (\S+) s, no more than 60 s"
+    words = r"re-planning the motion, with itself as the first guess: about (\S+) s, no more than 60 s"
     assert int(re.match(words, lines[1])[1]) >= 1
     assert any("iteration 1," in line for line in lines)
     assert "planning again with discontinuous torque" in lines

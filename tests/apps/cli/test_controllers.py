@@ -42,6 +42,6 @@ def test_a_run_that_breaks_limits_is_written_and_ends_with_1(run, tmp_path):
     profile = tmp_path / "coarse.yaml"
     command = f"export {tmp_path} --out {tmp_path / 'run.csv'} --profile {profile}"
     message = run(command, code=1).err
-    assert "the motion breaks limits as it is run" in message
+    assert "the motion exceeds limits as it is run" in message
     assert "the motion passes with" in message
     assert (tmp_path / "run.csv").exists()

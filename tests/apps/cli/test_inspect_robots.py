@@ -124,9 +124,9 @@ def test_inspect_shows_the_first_of_several_arms(run):
         f"left_{joint}" for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
     ]
     assert data["remarks"][0].endswith(
-        "from which several limbs branch off; --base-frame chooses another one"
+        "from which several limbs branch off; --base-frame chooses a different one"
     )
-    assert "--tool-frame chooses another one" in data["remarks"][1]
+    assert "--tool-frame chooses a different one" in data["remarks"][1]
     solvers = decompositions(run, baxter, "--tool-frame", "left_gripper")
     assert set(solvers.values()) == {"-"}  # offsets at the shoulder and the wrist
 

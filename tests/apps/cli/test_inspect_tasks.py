@@ -1,4 +1,4 @@
-"""`brachis inspect` on tasks: where the tool is in every convention, pairs that are never free, and how long it is."""
+"""`brachis inspect` on tasks: where the tool is in every convention, pairs that are never clear, and how long it is."""
 
 import json
 
@@ -90,10 +90,10 @@ def test_pairs_that_are_never_free_are_named_with_the_entry_that_lets_them_touch
     assert "the task cannot be planned: postures.home" in text
     pairs = run(f"inspect {file} --json").data["collisions"]["never_free"]
     free = run("inspect", file, "--set", f"collisions.disable={json.dumps(pairs)}")
-    assert "never free" not in free.out
+    assert "never clear" not in free.out
     assert "cannot be planned" not in free.out
     low = {**FLOOR, "half_space": {"normal": [0, 0, 1], "offset": -0.05}}
-    assert "never free" not in run(f"inspect {written(tmp_path, scene=[low])}").out
+    assert "never clear" not in run(f"inspect {written(tmp_path, scene=[low])}").out
 
 
 def test_it_fits_a_screen_and_has_the_reasons_with_verbose(run):
@@ -120,4 +120,7 @@ def test_what_is_left_out_of_an_mjcf_file_is_said_once(run, tmp_path):
         <geom size="0.1" pos="0 0 1"/></body></worldbody></mujoco>"""
     )
     for _ in range(2):
-        assert run(f"inspect {file}").err.count("no counterpart: collision shapes (1)") == 1
+        assert (
+            run(f"inspect {file}").err.count("no counterpart: collision shapes (1)")
+            == 1
+        )

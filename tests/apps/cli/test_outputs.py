@@ -74,7 +74,7 @@ def test_nothing_is_written_over_other_files(command, run, saved, monkeypatch):
     monkeypatch.chdir(saved)
     before = contents(saved)
     outcome = run(command, code=2)
-    reasons = "overwrite an input|of another kind|a known format"
+    reasons = "overwrite an input|of a different kind|a known format"
     assert re.search(reasons, outcome.err)
     assert contents(saved) == before
 
@@ -94,7 +94,7 @@ REFUSED_AT_ONCE = [
     ("report MOTION --out x.png", "suffix"),
     ("plot MOTION --out gone/x.png", "no folder gone"),
     ("report MOTION --out gone/x.html", "no folder gone"),
-    ("bottleneck MOTION --out mine", "to a folder"),
+    ("bottleneck MOTION --out mine", "need a folder"),
     ("plot MOTION --out x.png --kind torque", "Did you mean 'torques'?"),
     ("export MOTION --out x.csv --joints j1,j1", "'j1' is given twice"),
     ("plot MOTION --out x.png --kind fit", "the path was not fitted"),

@@ -43,7 +43,7 @@ def test_import_verifies_a_recording_which_every_command_takes(
     assert "unknown: the motion between the rows" in outcome.out
     run(f"verify {out}")
     assert (
-        "what limits cost is unknown: the motion was not planned, or was saved without its sensitivities"
+        "the cost of the limits is unknown: the motion was not planned, or was saved without its sensitivities"
         in run(f"bottleneck {out}").out
     )
     run(f"export {out} --out {tmp_path / 'again.json'}")

@@ -18,7 +18,7 @@ def test_a_report_lies_beside_its_motion_and_keeps_to_its_own_files(
     assert "MB" in outcome.out
     assert "the first line" in page.read_text(encoding="utf-8")
     page.write_text("<!doctype html><p>somebody else's", encoding="utf-8")
-    assert "of another kind than the new one" in error_of(f"report {result}")
+    assert "of a different kind than the new one" in error_of(f"report {result}")
     assert page.read_text(encoding="utf-8") == "<!doctype html><p>somebody else's"
 
 

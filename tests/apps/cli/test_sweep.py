@@ -80,7 +80,7 @@ def test_no_verified_plan_is_exit_code_1(run, sweep_file, tmp_path):
 def test_parts_of_a_sweep_give_one_table_by_merge(run, error_of, sweep_file, tmp_path):
     out = tmp_path / "out"
     assert "│ plans       │ 2 " in run(f"sweep {sweep_file} --part 1/2 --out {out}").out
-    assert "found no result of 2 plans: 1, 3" in error_of(
+    assert "found no result for 2 plans: 1, 3" in error_of(
         f"sweep {sweep_file} --merge --out {out}"
     )
     run(f"sweep {sweep_file} --part 2/2 --out {out}")

@@ -97,7 +97,7 @@ def test_no_closed_form(run, task, write, tmp_path):
         "planar: not planar: j2 moves out of the plane in which j1 turns" in outcome.err
     )
     assert (
-        "prismatic: all joints must be prismatic besides the redundant ones; revolute: j1, j2"
+        "prismatic: all joints except the redundant ones must be prismatic; revolute: j1, j2"
         in outcome.err
     )
 

@@ -137,7 +137,7 @@ def test_writers_replace_what_they_wrote_and_nothing_of_others(
     name, line_trajectory, tmp_path
 ):
     before = foreign_files(tmp_path)
-    with pytest.raises(InputError, match="exists and is of another kind"):
+    with pytest.raises(InputError, match="exists and is of a different kind"):
         write_kind(name, line_trajectory, tmp_path)
     assert (tmp_path / name).read_bytes() == before[name]
     (tmp_path / name).write_bytes(b"")

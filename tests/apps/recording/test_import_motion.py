@@ -93,7 +93,7 @@ def test_bottlenecks_are_when_limits_are_active(imported):
     assert found.to_dict()["sensitivities"] is None
     text = str(found)
     assert text.startswith(
-        "what limits cost is unknown: the motion was not planned, or was saved without its sensitivities\n"
+        "the cost of the limits is unknown: the motion was not planned, or was saved without its sensitivities\n"
     )
     assert "is at its torque limit for" in text
     with pytest.raises(InputError, match="the cost of its limits cannot be computed"):

@@ -156,7 +156,7 @@ def test_an_unverified_motion_says_which_check_fails(weaker_page):
     assert {kind for kind, _ in rows[1:]} == {"passed"}
     assert 'class="beyond"' in weaker_page.html
     assert not weaker_page.verified
-    assert "What the limits cost is unknown" in weaker_page.html
+    assert "The cost of the limits is unknown" in weaker_page.html
 
 
 def test_text_is_no_markup(weaker_page):

@@ -262,7 +262,7 @@ def test_parts_of_a_sweep_give_one_table_by_merge(
     assert len(here.plans) == 3
     with pytest.raises(
         InputError,
-        match=r"merge: parts of the sweep are missing; found no result of 1 plan: 3\. Run the missing parts",
+        match=r"merge: parts of the sweep are missing; found no result for 1 plan: 3\. Run the missing parts",
     ):
         brachis.sweep(content, out, merge=True)
     assert not (out / "table.parquet").exists()

@@ -60,7 +60,7 @@ def test_what_holds_the_motion_back_is_shown_without_a_solve(line_result, monkey
 
     module = sys.modules["brachis.apps.bottleneck.report"]
     monkeypatch.setattr(module, "plan_again", refuse)
-    unknown = "what limits cost is unknown"
+    unknown = "the cost of the limits is unknown"
     known = "more torque at j1"
     for motion, text in (
         (line_result.explained_trajectory, known),

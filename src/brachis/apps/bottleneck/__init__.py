@@ -58,4 +58,4 @@ __all__ = [
     "report",
     "saturations",
 ]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # what tab completion shows

@@ -1,11 +1,11 @@
-"""Check of the multipliers' predictions: each limit is raised in turn, and the program is solved again.
+"""Check of the multipliers' predictions, by raising each limit in turn and solving the program again.
 
-Knots, collocation points and branch margins do not change. Every solve begins at the solution and uses a tighter
-tolerance. A solution counts as an optimum if least squares find multipliers for it, whatever status the solver reports.
-If a change is not as predicted, the unchanged problem is solved again from the new solution: the step may have led to
-another local optimum, which is not an effect of the limit.
+Knots, collocation points and branch margins do not change. Every solve begins at the original solution and uses a
+tighter tolerance. A solution counts as an optimum if least squares find multipliers for it, whatever status the solver
+reports. If the change of the end time is not as predicted, the unchanged problem is solved again from the new solution:
+the step may have led to a different local optimum, which is not an effect of the limit.
 
-Multipliers are derivatives. Within a finite step other limits may become active, and the saving is then smaller than
+Multipliers are derivatives. Within a finite step, other limits may become active; the saving is then smaller than
 predicted.
 """
 
@@ -35,23 +35,23 @@ from brachis.optimise.program import Program
 STEP = 0.01
 """Default fraction by which limits are raised."""
 _FEASIBLE = 1e-7
-"""Largest violation of a row at a solution, dimensionless."""
+"""Maximum violation of a row of the program at a solution, dimensionless."""
 
 
 @dataclass(frozen=True)
 class CheckedSensitivity:
-    """A predicted change of t_E, and the change found by solving again.
+    """A predicted change of the end time t_E, and the change found by solving again.
 
     Attributes
     ----------
     sensitivity : Sensitivity
     predicted : float
-        Change of t_E that the multipliers predict, s.
+        Change of the end time that the multipliers predict, s.
     re_solved : float
-        Change found by solving again, s.
+        Change of the end time found by solving again, s.
     other_optimum : float
-        If the solve ended at another local optimum, the difference between the end time there without the change and
-        `t_end`, s; `re_solved` is then the change from that optimum. 0 otherwise.
+        0 unless the solve ended at a different local optimum. Then it is the end time of this optimum for the unchanged
+        problem minus `t_end`, s, and `re_solved` is the change from this optimum.
     optimal : bool
         False if the solve ended without an optimum, so that `re_solved` is only approximate.
     """
@@ -97,7 +97,7 @@ class SensitivityCheck(Summary):
     t_end : float
         End time of the unchanged problem at the tighter tolerance, s.
     entries : tuple of CheckedSensitivity
-        In the order of the sensitivities.
+        Results in the order of the sensitivities.
     wall_time : float
         Wall time of the check, s.
     """
@@ -142,11 +142,11 @@ def check_sensitivities(
     Parameters
     ----------
     refined : SolvedProgram
-        ``result.candidate.optimum``.
+        Solved program to check, ``result.candidate.optimum``.
     predictions : Sensitivities
         Predictions to check: ``result.sensitivities``.
     step : float, optional
-        Fraction by which each limit is relaxed; a negative one tightens it.
+        Fraction by which each limit is relaxed; a negative fraction tightens it.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def check_sensitivities(
         for entry in predictions.limits:
             bounds = figures.get((entry.label, entry.side))
             if bounds is None or entry.label.cause == PROCESS_SPEED:
-                continue  # the speed determines s(t), so no row of the program represents it
+                continue  # the speed determines s(t), so no row of the program represents this speed
             # If a limit changes nothing, the solution remains an optimum.
             if abs(entry.change(step)) <= 1e-9 * t_end(base):
                 same = CheckedSensitivity(entry, 0.0, 0.0, 0.0, optimal=True)
@@ -187,7 +187,7 @@ def _check_limit(
     base: np.ndarray,
     bounds: list[LimitBound],
 ) -> CheckedSensitivity:
-    """Solve with one limit raised; if the result may belong to another local optimum, solve without it from there."""
+    """Solve with one limit raised; if the result may belong to a different optimum, also solve unchanged from there."""
     predicted = entry.change(step)
     raised = program
     for limit, bound in bounds:
@@ -212,7 +212,7 @@ def _check_limit(
 
 
 def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Solve to a tight tolerance from x, trying one backend after the other.
+    """Solve the program to a tight tolerance from x, trying one backend after the other.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def _solve_again(program: Program, x: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _stationarity(program: Program, x: np.ndarray) -> float:
-    """Residual of the multipliers at x, (v,). It is infinite if the branch does not reach a collocation point."""
+    """Return the residual of the multipliers at x, (v,); infinite if the branch does not reach a collocation point."""
     try:
         return multipliers_of(program, x).residual
     except UnreachableError:

@@ -1,4 +1,4 @@
-"""Planning a saved motion again from itself, for files without sensitivities and for checks.
+"""Re-planning a saved motion with itself as the first guess, for files without sensitivities and for checks.
 
 The initial guess is already an optimum, so a single search from it is enough, and it ends at the same optimum.
 """
@@ -20,7 +20,7 @@ from brachis.search.stages import FinishedCandidate
 from brachis.trajectory import Trajectory
 
 _SAME = 1e-3
-"""Largest relative difference between end times of the same optimum."""
+"""Relative difference below which two end times count as the same optimum."""
 
 
 def plan_again(
@@ -37,9 +37,10 @@ def plan_again(
     trajectory : Trajectory
         A planned or loaded motion, without idle joints (`narrow_motion`).
     listener : callable, optional
-        Called with a text about every iteration.
+        Function that is called with a text about every iteration.
     families, own_limits : sequence, optional
-        The ones with which the motion was planned, as passed to `brachis.plan`. They are not saved with it.
+        The ones with which the motion was planned, as passed to `brachis.plan`. Families and limits are not saved with
+        the motion.
 
     Returns
     -------
@@ -50,8 +51,8 @@ def plan_again(
     InputError
         The closed form or the branch is unknown; see `brachis.plan`.
     PlanningError
-        The motion is not an optimum of its problem, so that the plan ended at another one; or the task's time limit was
-        too short.
+        The motion is not an optimum of its problem, so that the plan ended at a different motion; or the task's time
+        limit was too short.
     """
     task = trajectory.task
     changes: dict[str, object] = {}
@@ -95,7 +96,7 @@ def search_from(
     deadline: Deadline,
     listener: Listener,
 ) -> FinishedCandidate:
-    """Search for the fastest motion of a problem, from a motion of a similar one; PlanningError if none is found."""
+    """Search for the fastest motion of a problem, from a similar problem's; PlanningError if none is found."""
     search = Search(problem, Decompositions(problem, families), deadline, listener)
     with use_one_thread(), search.end_early():
         search.run(motion)

@@ -1,8 +1,8 @@
-"""Comparison of a motion with the best value known, which shows how much time the motion loses.
+"""Comparison of a motion with the best end time known, which shows how much time the motion loses.
 
-The reference solves the same problem with discontinuous torque, starting from the motion. Rest means zero velocity
-only, so that torques may leave their static values at once, and knots lie where torques switch. Limits on higher
-derivatives are left out. The result is a local optimum, not a proven bound.
+To compute the reference, the same problem is solved with discontinuous torque, starting from the motion. Rest means
+only zero velocity, so that torques may leave their static values at once. Knots lie where torques switch. Limits on
+higher derivatives are left out. The result is a local optimum, not a proven bound.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from brachis.search.stages import FinishedCandidate
 
 MEANING = "the same problem with discontinuous torque allowed; the best value known, not a proven bound"
 _JUMPING = 2
-"""Highest derivative that is bounded if accelerations jump. Limits on higher derivatives are left out."""
+"""Order of the highest derivative that is bounded if accelerations jump. Limits on higher derivatives are left out."""
 _TIME_LIMIT = 8.0
-"""Largest wall time for the reference, s."""
+"""Maximum wall time for computing the reference, s."""
 _TOLERANCE = 1e-4
 """Fraction of the motion time that the knots of the reference may cost."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The best value known.
+    """The best end time known for the problem of a motion.
 
     Attributes
     ----------
@@ -41,9 +41,9 @@ class Reference:
     intervals : int
         Number of intervals of the reference's splines.
     wall_time : float
-        Wall time of the plan, s.
+        Wall time for computing the reference, s.
     candidate : FinishedCandidate
-        The reference motion.
+        The reference motion, as a finished candidate.
     """
 
     t_end: float
@@ -69,16 +69,16 @@ def find_reference(
     families: Sequence[Family] = (),
     listener: Listener = ignore,
 ) -> Reference | None:
-    """Plan again from the motion, with ``rest: velocity`` and as many intervals as needed.
+    """Plan again, starting from the motion, with ``rest: velocity`` and as many intervals as needed.
 
     Parameters
     ----------
     candidate : FinishedCandidate
-        ``result.candidate``.
+        The motion to compare, ``result.candidate``.
     families : sequence, optional
         Families with which the motion was planned.
     listener : callable, optional
-        Called with a text about every iteration.
+        Function that is called with a text about every iteration.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def find_reference(
     known = candidate.problem.limits
     limits = [limit for limit in known if limit.order <= _JUMPING]
     if len(limits) < len(known):
-        # The verification still checks these limits, so the motion need not pass it.
+        # The verification still checks the limits that were left out, so the motion may fail the verification.
         refinement = task.refinement.model_copy(update={"max_rounds": 0})
         changes["refinement"] = refinement
     problem = replace(

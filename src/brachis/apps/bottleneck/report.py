@@ -54,13 +54,13 @@ class BottleneckReport:
     saturations : tuple of Saturation
         When every limit is active. Limits that are active longest come first.
     phases : tuple of PhaseLimits
-        Limits that are active in each phase.
+        For each phase, the limits that are active in it.
     timing : TimingGap or None
         Comparison with the fastest timing of the motion's joint path; None if unknown.
     check : SensitivityCheck or None
-        Comparison of the predictions with solving again, if requested.
+        Comparison of the predictions with the results of solving again, if requested.
     reference : Reference or None
-        Motion with the best value known, if requested and found.
+        Motion with the best end time known, if requested and found.
     reference_sought : bool
         Whether the reference was requested.
 
@@ -88,7 +88,7 @@ class BottleneckReport:
     def text(self, *, degrees: bool = False) -> str:
         """Return the report as text, with angles in degrees if requested."""
         lines = [
-            "what limits cost is unknown: the motion was not planned, or was saved without its sensitivities"
+            "the cost of the limits is unknown: the motion was not planned, or was saved without its sensitivities"
         ]
         if self.sensitivities is not None:
             lines = _costs(self.sensitivities, self.t_end, degrees=degrees)
@@ -117,7 +117,7 @@ class BottleneckReport:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        """Return as many lines of the text as a screen has room for."""
+        """Return as many lines of the report as fit on a screen."""
         lines = str(self).split("\n")
         return "\n".join([*lines[:LINES], "..."] if len(lines) > LINES else lines)
 
@@ -154,18 +154,20 @@ def report(
     Parameters
     ----------
     motion : Result, Trajectory or path
-        A result of `brachis.plan`, a trajectory, or the file of one. A trajectory without saved sensitivities, or with
-        `check` or `reference`, is planned again from itself (`plan_again`).
+        A result of `brachis.plan`, a trajectory, or the file of either. A trajectory is planned again (`plan_again`) if
+        it has no saved sensitivities, or if `check` or `reference` is set.
     check : bool, optional
         Whether to solve again with every limit raised by 1 %, and compare with the multipliers' predictions.
     reference : bool, optional
-        Whether to plan again with discontinuous torque allowed. This gives the best value known, not a proven bound.
+        Whether to plan again with discontinuous torque allowed. The reference is the best end time known, not a proven
+        bound.
     solve : bool, optional
-        Whether a motion without saved sensitivities is planned again.
+        Whether to plan a motion without saved sensitivities again.
     families, own_limits : sequence, optional
-        The ones with which the motion was planned, as passed to `brachis.plan`. They are not saved with it.
+        The ones with which the motion was planned, as passed to `brachis.plan`. Families and limits are not saved with
+        the motion.
     listener : callable, optional
-        Called with one line of text about each step.
+        Function that is called with one line of text about each step.
 
     Returns
     -------
@@ -174,9 +176,9 @@ def report(
     Raises
     ------
     InputError
-        The closed form of a trajectory is unknown; or families or limits are not valid.
+        The closed form of a trajectory is unknown, or families or limits are invalid.
     PlanningError
-        A trajectory is not an optimum of its problem; or, with `check`, no solver solved the problem again.
+        A trajectory is not an optimum of its problem; or, with `check`, no solver could solve the problem again.
 
     Examples
     --------
@@ -215,7 +217,9 @@ def report(
     if candidate is None and ((costs is None and solve) or check or reference):
         longest = trajectory.task.search.time_limit
         words = f"about {math.ceil(seconds)} s, no more than {longest:g} s"
-        listener(f"planning the motion again from itself: {words} (search.time_limit)")
+        listener(
+            f"re-planning the motion, with itself as the first guess: {words} (search.time_limit)"
+        )
         candidate = plan_again(
             trajectory, listener, families=families, own_limits=own_limits
         )
@@ -239,21 +243,25 @@ def report(
 
 
 _LOOKS = 40
-"""Time to plan a motion from itself, as a multiple of the time to find its active limits: the median of 30 motions, for
-which it was 14 to 100."""
+"""Time to re-plan a motion with itself as the first guess, as a multiple of the time to find its active limits: the
+median of 30 motions, for which this multiple was 14 to 100.
+"""
 _FRACTION = 0.1
 """Fraction by which limits are raised in the sentences on their cost."""
 _FRACTION_OF_RANGE = 0.01
-"""The same for the end of a range. With 10 % of a range, a weld gained only a seventh of the predicted saving."""
+"""Fraction of a range by which its end is moved in such sentences.
+
+With 10 %, a weld gained only a seventh of the predicted saving.
+"""
 _VERBS = {
     "exact": "saves",
     "estimate": "saves about",
     "least": "saves at least about",
     "bound": "saves, along the same joint path, no more than",
 }
-"""Words for how much a change of the task saves, by the accuracy of the saving."""
+"""Words that introduce the saving of a change of the task, by the accuracy of the saving."""
 _NOTHING = 1e-5
-"""Fraction of t_E; smaller savings are not mentioned."""
+"""Fraction of the end time t_E below which savings are not mentioned."""
 
 
 def _figures(value: float) -> str:
@@ -262,12 +270,12 @@ def _figures(value: float) -> str:
 
 
 def _part(saved: float, t_end: float) -> str:
-    """Write a time, s, as a percentage of t_E and in ms."""
+    """Write a time, s, as a percentage of the end time t_E and in ms."""
     return f"{_figures(100.0 * saved / t_end)} % ({_figures(1e3 * saved)} ms)"
 
 
 def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list[str]:
-    """Say what every limit costs, beginning with the costliest."""
+    """Say how much time every limit costs, beginning with the costliest."""
     lines = []
     if not sensitivities.reliable:
         lines.append(
@@ -286,7 +294,7 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
     costly = [saving for saving in savings if saving[0] > _NOTHING * t_end]
     lines += [f"{change} {_part(saved, t_end)}" for saved, change in costly]
     if not sensitivities.reliable:
-        lines.append("what other limits cost is unknown")
+        lines.append("the cost of other limits is unknown")
     elif len(costly) < len(savings):
         lines.append("no other limit costs time" if costly else "no limit costs time")
     if sensitivities.source == TIMINGS:
@@ -297,7 +305,7 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
     lines.append(f"(to first order, from {how})")
     if not sensitivities.unique:
         lines.append(
-            "(each saving is for raising one limit alone; lowering it by as much may cost more time than that)"
+            "(each saving is for raising one limit alone; lowering it by as much may cost more time)"
         )
     for boundary in sensitivities.boundaries:
         saved = boundary.derivative * boundary.margin
@@ -311,19 +319,19 @@ def _costs(sensitivities: Sensitivities, t_end: float, *, degrees: bool) -> list
 
 
 def _predict_saving(entry: Sensitivity) -> float:
-    """Predict the time that more room at one limit saves, s. For a given speed, the time is inverse to the speed."""
+    """Predict the time, s, that more room at one limit saves. The time at a given speed is inverse to the speed."""
     saved = -entry.change(_fraction_of(entry))
     is_speed = bool(entry.label.cause) and entry.label.unit == "m/s"
     return saved / (1.0 + _FRACTION) if is_speed else saved
 
 
 def _fraction_of(entry: Sensitivity) -> float:
-    """Return the fraction by which a limit is raised in its sentence; less for ranges, where other limits take over."""
+    """Return the fraction by which a limit is raised in its sentence; it is smaller for the end of a range."""
     return _FRACTION if entry.side is None else _FRACTION_OF_RANGE
 
 
 def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
-    """Say in words what more room at one limit means."""
+    """Say in words by how much one limit is raised."""
     label = entry.label
     end = entry.side
     unit, factor = shown_unit(label.unit, degrees=degrees)
@@ -341,7 +349,7 @@ def _more_room(entry: Sensitivity, *, degrees: bool) -> str:
 
 
 def _timing(gap: TimingGap, t_end: float) -> list[str]:
-    """Say what the timing costs if that is at least 1 %; ``intervals: auto`` leaves about 0.1 %."""
+    """Say what the timing costs if this is at least 1 % of the end time; ``intervals: auto`` leaves about 0.1 %."""
     saved = t_end - gap.least_time
     if saved < 0.01 * t_end or gap.left_out:
         return []

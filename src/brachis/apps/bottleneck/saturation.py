@@ -26,13 +26,14 @@ class LimitRatios(Summary):
     Attributes
     ----------
     t : (K,) ndarray
-        Ascending, s. Where a derivative that a limit needs jumps, the time occurs twice, before and after the jump.
+        Times, ascending, s. Where a derivative that a limit needs jumps, the time occurs twice, for just before and
+        just after the jump.
     labels : tuple of Label
-        Labels of the columns.
+        Labels of the columns of `values`.
     values : (K, c) ndarray
-        1 at the upper limit, -1 at the lower one. For a position it is the place in its range, with 0 in the middle.
-        For a range with only one end it is 1 minus the distance from this end, rad or m, and 0 farther away. For a
-        process speed it is 1 while the tool has this speed, and 0 otherwise.
+        Ratios: 1 at the upper limit and -1 at the lower limit. For a position, the ratio is 0 in the middle of the
+        range. For a range with only one end, the ratio is 1 minus the distance from this end, rad or m, but at least 0.
+        For a process speed, the ratio is 1 while the tool has this speed, and 0 otherwise.
     """
 
     t: np.ndarray
@@ -82,7 +83,7 @@ def limit_ratios(
     ----------
     trajectory : Trajectory
     limits : sequence of Limit, optional
-        Limits to compare with. Default: those of the trajectory's task.
+        Limits to compare with. Default: the limits of the trajectory's task.
 
     Returns
     -------
@@ -117,7 +118,7 @@ def limit_ratios(
 
 
 def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
-    """Return 1 at the times, (K,), at which the tool has a given speed, m/s, and 0 at all other times."""
+    """Return 1 for each of the times, (K,), at which the tool has a given speed, m/s, and 0 for all other times."""
     slack = tolerances.TIME * trajectory.t_end
     is_held = np.zeros(len(t))
     for phase in trajectory.phases:
@@ -127,23 +128,24 @@ def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarra
 
 
 THRESHOLD = 0.99
-"""A limit becomes active when the motion uses this fraction of it."""
+"""Fraction of a limit; the limit becomes active when the motion uses this fraction."""
 SHORTEST_SHARE = 5e-4
-"""Limits that are active for a smaller fraction of the time are not named."""
+"""Fraction of the motion time; limits that are active for a smaller fraction are not named."""
 RIPPLE = 0.95
-"""A limit stays active until the motion uses less than this fraction of it, because splines ripple between knots."""
+"""Fraction of a limit; an active limit stays active until the motion uses less, because splines ripple between knots.
+"""
 
 
 @dataclass(frozen=True)
 class ActiveInterval:
-    """A time interval during which a limit is active, ripple included.
+    """A time interval during which a limit is active, including ripple.
 
     Attributes
     ----------
     begin, end : float
-        Times, s.
+        Times at which the interval begins and ends, s.
     side : {"lower", "upper"}
-        Which of the two bounds is active. For a torque, velocity or acceleration ``lower`` is the negative one.
+        Which of the two bounds is active. For a torque, velocity or acceleration, ``lower`` is the negative bound.
     """
 
     begin: float
@@ -160,11 +162,12 @@ class Saturation(Summary):
     label : Label
         Label of the limited value.
     share : float
-        Fraction of the time, 0 to 1, during which the limit is active.
+        Fraction of the motion time, 0 to 1, during which the limit is active.
     peak : float
-        Largest ratio to the limit.
+        Largest ratio of the value to the limit.
     is_drawn : bool
-        Whether timelines show this value: it uses more than half of its limit, and changes or is active.
+        Whether timelines show this value, which is so if it uses more than half of its limit and also changes or is
+        active.
     active : tuple of ActiveInterval
         Intervals in which the limit is active, in the order of time.
     """
@@ -200,7 +203,7 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
     Returns
     -------
     tuple of Saturation
-        One for each limited value. Those that are active longest come first.
+        One entry for each limited value. Limits that are active longest come first.
     """
     ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
     entries = []
@@ -227,7 +230,8 @@ class PhaseLimits:
     ----------
     phase : MotionPhase
     shares : tuple of (Label, float)
-        Limits that are active in the phase, each with the fraction of its time. Those active longest come first.
+        Limits that are active in the phase, each with the fraction of the phase's time. Limits that are active longest
+        come first.
     """
 
     phase: MotionPhase
@@ -271,7 +275,7 @@ def limits_by_phase(
 
 
 def _find_active(t: np.ndarray, values: np.ndarray) -> list[tuple[float, float]]:
-    """Find the intervals in which values, linear between the times (K,), stay at the threshold apart from ripple."""
+    """Find the intervals in which values, (K,), linear between the times, stay at the threshold except for ripple."""
     samples = np.flatnonzero((values >= THRESHOLD) | (values < RIPPLE))
     is_active = np.pad(values[samples] >= THRESHOLD, 1)
     firsts = samples[is_active[1:-1] & ~is_active[:-2]]

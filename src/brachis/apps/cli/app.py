@@ -1,4 +1,4 @@
-"""The Typer application: help, exit codes, and the options that several commands share with their parsing."""
+"""The Typer application: help, exit codes, and the options that several commands share, with their parsing."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _VERBOSITY = ContextVar("verbosity", default=Verbosity.NORMAL)
 
 
 def get_verbosity() -> Verbosity:
-    """Return the verbosity that the command line asks for."""
+    """Return the verbosity set on the command line."""
     return _VERBOSITY.get()
 
 
@@ -66,10 +66,13 @@ class InterruptedByUserError(BrachisError):
 
 
 class _Commands(TyperGroup):
-    """Group of commands that the user can interrupt. It adds the options that all commands share."""
+    """Group of commands that the user can interrupt. The group adds the options that all commands share."""
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
-        """Run a command, including its imports. A Ctrl-C that nothing else has handled ends it with an error."""
+        """Run a command, including its imports.
+
+        A Ctrl-C that nothing else has handled ends the command with an error.
+        """
         try:
             with interrupts.interruptible():
                 return super().invoke(ctx)
@@ -88,7 +91,7 @@ class _Commands(TyperGroup):
         return command
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]
-        """Find a command by its name. If a file stands in its place, name the command that is missing."""
+        """Find a command by its name. If a file is given in its place, name the command that is missing."""
         if self.get_command(ctx, args[0]) is None and is_file(args[0]):
             command = "inspect" if Path(args[0]).suffix in ROBOT_SUFFIXES else "plan"
             ctx.fail(f"A command comes before a file: brachis {command} {args[0]}")
@@ -120,10 +123,10 @@ csv : path
     CSV file with columns for time (t, time_ms, ...) and joint positions (j1, q_j1, j1_pos [deg], ...), and for
     velocities (qd_j1, ...) and accelerations (qdd_j1, ...) if known.
 robot : path
-    URDF file, or a task file (.yaml) whose robot, limits and settings are used.
+    URDF file, or task file (.yaml) whose robot, limits and settings are used.
 task_space : str, optional
-    Task space of the path: rows such as x,y, or one of the words position, pose, pose_free_roll, joints. Default: that
-    of the task, or the largest task space that the robot allows.
+    Task space of the path: rows such as x,y, or one of the words position, pose, pose_free_roll, joints. Default: the
+    task space of the task, or the largest one that the robot allows.
 angle : str, optional
     Unit of angles in columns whose heading has no unit: rad or deg.
 length : str, optional
@@ -131,11 +134,11 @@ length : str, optional
 time : str, optional
     Unit of times in a column whose heading has no unit: s or ms.
 tolerance : float, optional
-    Largest deviation of the recovered path from the motion, m and rad. Default: 1e-6, or more if the last digits in
-    the file or the noise are coarser.
+    Maximum deviation of the recovered path from the motion, m and rad. Default: 1e-6, or more if the digits in the file
+    or the noise are coarser.
 noise : float, optional
     Standard deviation of measured positions, rad or m. The positions are smoothed accordingly. Default: the standard
-    deviation of rounding to the digits in the file.
+    deviation due to rounding to the digits in the file.
 """
 """Help texts of options that several commands share."""
 
@@ -148,7 +151,7 @@ class DocumentedCommand(TyperCommand):
 
     def __init__(self, *args: Any, **keywords: Any) -> None:
         super().__init__(*args, **keywords)
-        docstring = inspect.getdoc(self.callback) or ""  # none under python -OO
+        docstring = inspect.getdoc(self.callback) or ""  # empty under python -OO
         titles = r"\n\n(Parameters|Examples)\n-+\n"
         self.help, *titled_texts = re.split(titles, docstring)
         sections = dict(zip(titled_texts[::2], titled_texts[1::2], strict=True))
@@ -173,7 +176,7 @@ class DocumentedCommand(TyperCommand):
 
 
 def split_vectors(args: Sequence[str], options: set[str]) -> list[str]:
-    """Split the word that follows one of `options`, or is joined to it by ``=``, at commas and spaces."""
+    """Split words at commas and spaces if they follow one of `options`, or are joined to it by ``=``."""
     words: list[str] = []
     for argument in args:
         option, equals, value = argument.partition("=")
@@ -200,7 +203,7 @@ app = typer.Typer(
 
 
 def _print_version(is_set: bool) -> None:
-    """Print the version and stop."""
+    """Print the version and exit."""
     if is_set:
         typer.echo(f"brachis {brachis.__version__}")
         raise typer.Exit
@@ -252,7 +255,7 @@ Json = Annotated[bool, Option("--json")]
 Degrees = Annotated[bool, Option("--degrees")]
 Changes = Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE")]
 _MOTIONS = ("result.npz", "unverified.npz")
-"""File names of a motion in the folder of ``brachis plan --out``."""
+"""File names that a motion may have in the folder written by ``brachis plan --out``."""
 
 
 def motion_file(result: Path) -> Path:
@@ -289,7 +292,7 @@ def task_space_of(text: str | None) -> str | list[str] | None:
 def read_changes(
     changes: Sequence[str] | None, *, strict: bool | None = None
 ) -> dict[str, object]:
-    """Read the keys and values that ``--set`` and ``--strict`` set.
+    """Read the keys and values given by ``--set`` and ``--strict``.
 
     If a key is set twice, the last value is used.
     """
@@ -302,7 +305,7 @@ def read_changes(
 
 
 def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
-    """Load a task file with changed keys, as `read_changes` returns them."""
+    """Load a task file with changed keys, as returned by `read_changes`."""
     robots = brachis.robots
     if robots.is_robot(str(path)) and path.suffix == "":
         name = robots.path_of(str(path)).parent.name
@@ -310,7 +313,7 @@ def load_changed_task(path: Path, keys: Mapping[str, object]) -> brachis.Task:
             "this is the name of a robot, not of a task file",
             where=name,
             allowed="a task file",
-            hint=f"brachis new {name} writes a first task for it",
+            hint=f"brachis new {name} writes a first task for this robot",
         )
     return brachis.load_task(path, changes=keys)
 
@@ -325,7 +328,7 @@ def refuse_options(values: Mapping[str, object], source: str, allowed: str) -> N
     source : str
         What the input is, with an article, for example "a URDF".
     allowed : str
-        The input that the options are meant for.
+        The input for which the options are meant.
 
     Raises
     ------
@@ -347,7 +350,7 @@ def urdf_of(source: Path) -> Path:
     Raises
     ------
     UnknownNameError
-        There is neither a file nor a robot of this name.
+        There is neither a file nor a robot with this name.
     """
     if is_file(source) or is_folder(source) or source.suffix or len(source.parts) > 1:
         return source

@@ -1,7 +1,7 @@
-"""Writing files: all results or none, then the figures that can be written. Foreign files are never overwritten.
+"""Writing files: all results or none, then the figures that can be written. Other files are never overwritten.
 
-This module also ends commands that make a motion: it writes their files, prints the answer and what was not completed,
-and returns the exit code.
+The function `finish` completes commands that produce a motion: it writes their files, prints the result and what was
+not completed, and returns the exit code.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ Drawing = Callable[[], Any]
 def check_output(
     out: Path, inputs: Iterable[Path | None], beginning: bytes = b""
 ) -> None:
-    """Raise an error for an output that cannot be written, or that would replace a file that should stay.
+    """Raise an error for an output that cannot be written, or that would replace a file that must be kept.
 
-    That is an output whose folder does not exist, or one that would replace a folder, an input of the command or a file
-    of another kind.
+    An output cannot be written if its folder does not exist. An output must not replace a folder, an input of the
+    command or a file of a different kind.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def check_output(
     inputs : iterable of Path or None
         Files that the command reads.
     beginning : bytes, optional
-        Pattern that matches the beginning of older files of this kind. Needed only for checks ahead of writing, which
-        makes this check itself.
+        Pattern that matches the beginning of older files of this kind. The pattern is needed only for checks ahead of
+        writing, because writing makes this check itself.
 
     Raises
     ------
@@ -104,27 +104,27 @@ def write_files(
     Parameters
     ----------
     out : Path
-        Existing folder.
+        Existing folder into which the files are written.
     results, figures : mapping of str to callable
-        File names, and the function that writes each file.
+        Functions that write the files, by file name.
     listener : callable
-        Called with a text that says which figure is being drawn.
+        Function that is called with a text that says which figure is being drawn.
     stale : iterable of str, optional
-        Older files to remove.
+        Names of older files to remove.
 
     Returns
     -------
     list of str
         Paths of the files that were written.
     list of InputError
-        One for each figure that could not be written.
+        One error for each figure that could not be written.
 
     Raises
     ------
     InputError
         A result cannot be written.
     KeyboardInterrupt
-        Ctrl-C while figures were drawn. Its text names the files that were written before.
+        Ctrl-C was pressed while figures were drawn. The text of the exception names the files written before.
     """
     written = [str(out / name) for name in results]
     failures = []
@@ -173,7 +173,7 @@ def write_one(
     inputs: Iterable[Path | None] = (),
     beginning: bytes = b"",
 ) -> Any:
-    """Write one file, unless it would replace a file that `check_output` protects; return what writing returns."""
+    """Write one file unless it would replace a file that `check_output` protects; return what `write` returns."""
     check_output(out, inputs, beginning)
     with end_cleanly():
         return write(out)
@@ -187,7 +187,7 @@ def write_text(text: str, path: Path) -> None:
 
 @contextmanager
 def end_cleanly() -> Iterator[None]:
-    """Let SIGTERM leave the block like an exception, so that temporary files are removed."""
+    """Make SIGTERM leave the block like an exception, so that temporary files are removed."""
     before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         yield
@@ -201,11 +201,11 @@ _UNVERIFIED = {
     "overview.png": "unverified.png",
     "today.npz": "today.npz",
 }
-"""File names for a motion that is not verified. All other files get the prefix ``unverified_``."""
+"""File names for a motion that did not pass the verification. All other files get the prefix ``unverified_``."""
 
 
 def _unverified(name: str) -> str:
-    """Return the name that a file has if its motion is not verified."""
+    """Return the name of a file if its motion did not pass the verification."""
     return _UNVERIFIED.get(name, f"unverified_{name}")
 
 
@@ -220,8 +220,8 @@ def output_folder(
     Raises
     ------
     InputError
-        The folder cannot be created or has the name of a file, or it contains a file of one of these names that
-        `check_output` does not allow to be replaced.
+        The folder cannot be created or has the name of an existing file, or it contains a file with one of these names
+        that `check_output` does not allow to be replaced.
     """
     if out is None:
         yield
@@ -229,7 +229,7 @@ def output_folder(
     has_suffix = out.suffix in {Path(name).suffix for name in names}
     if is_file(out) or (has_suffix and not is_folder(out)):
         raise InputError(
-            "several files are written to a folder, but this is the name of a file",
+            "several files need a folder, but this is the name of a file",
             where="--out",
             found=out,
             allowed="a folder",
@@ -262,25 +262,26 @@ def finish(
     result: brachis.Result | None,
     complaint: str = "it is marked unverified",
 ) -> int:
-    """Write a motion's files, print the answer and what was not completed, and return the exit code.
+    """Write a motion's files, print the result and what was not completed, and return the exit code.
 
     Parameters
     ----------
     data : dict
-        The answer, which is the content of the JSON file and of ``--json``. The latter also lists the files.
+        Result of the command: the content of the JSON file and of the output with ``--json``. With ``--json``, the
+        files are also listed.
     results : mapping of str to callable
         Functions that write the files of the motion, by file name.
     figures : mapping of str to callable
         Functions that draw the figures, by file name.
     out : Path or None
-        Folder; no files are written if it is None.
+        Output folder; if it is None, no files are written.
     names : sequence of str
-        Names of all files that the command may write. Older files of these names are removed.
+        Names of all files that the command may write. Older files with these names are removed.
     verified : bool
     json : bool
-        Whether the answer is printed as JSON.
+        Whether the result is printed as JSON.
     show : callable
-        Prints the answer for a person.
+        Function that prints the result as text for a person.
     result : Result or None
         Result of a search, if there was one.
     complaint : str, optional
@@ -330,7 +331,7 @@ def draw(make: Drawing, path: Path) -> None:
 
 
 def exit_code(verified: bool, failures: Iterable[InputError]) -> int:
-    """Print which figures could not be written, and return the exit code of a command that makes a motion."""
+    """Print which figures could not be written, and return the exit code of a command that produces a motion."""
     code = 0
     for reason, failure in {str(failure): failure for failure in failures}.items():
         print_error(f"the result was written, but its figures were not: {reason}")

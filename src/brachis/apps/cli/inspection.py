@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 _NONE = "none"
 """Entry of a table for a missing limit or mass, and for a joint without friction."""
 _LISTED = 12
-"""Largest number of choices of redundant joints that are printed without --verbose."""
+"""Maximum number of choices of redundant joints that are printed without --verbose."""
 
 
 def inspect(
@@ -60,24 +60,25 @@ def inspect(
 ) -> None:
     """Show a robot's joints and its closed forms.
 
-    This prints the limits, mass and friction of every joint, and the choices of redundant joints that have a closed
-    form. With --verbose it also prints the branches, why the other choices have no closed form, and the pairs of bodies
-    that may collide.
+    The command prints the limits, mass and friction of every joint, and the choices of redundant joints that have a
+    closed form. With --verbose, the command also prints the branches, the reasons why other choices have no closed
+    form, and the pairs of bodies that may collide.
 
     Parameters
     ----------
     source : path
-        URDF file or name of a robot. For a task file, this shows its robot with the limits and masses in use, and the
-        path with the postures at its ends.
+        URDF file, name of an included robot, or task file. A task file shows its robot with the limits and masses in
+        use, and its path with the postures at both ends.
     task_space : str, optional
-        What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: that of the
-        task, or the largest task space that the robot allows.
+        What the path prescribes: rows such as x,y or x,y,z,yaw, or a word such as pose or axis. Default: the task space
+        of the task, or the largest one that the robot allows.
     posture : str, optional
-        Show where the tool is at these joint positions, for example '0, 0.3, 1.2', or in a named posture of the task.
+        Show where the tool is in this posture, given as joint positions such as '0, 0.3, 1.2' or by its name in the
+        task.
     frame : str, optional
-        Frame of the task in which the tool is shown. Default: the world.
+        Frame, named in the task, in which the place of the tool is shown. Default: the world.
     lock : list of str, optional
-        Joint that is held at a position, as name=value. The option can be repeated.
+        Joint to hold at a position, given as name=value. The option can be repeated.
 
     Examples
     --------
@@ -101,7 +102,7 @@ def inspect(
             "--lock": lock,
         }
         set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
-        refuse_options(options, "a task file", f"a URDF; a task has {set_it}")
+        refuse_options(options, "a task file", f"a URDF; in a task file, set {set_it}")
         task = load_changed_task(source, keys)
         space = space or task.task_space
         tolerances = task.tolerances
@@ -121,7 +122,7 @@ def inspect(
     if space is None:
         space = brachis.ik.default_task_space(robot)
         words = space if isinstance(space, str) else ",".join(space)
-        remarks.append(f"task space: {words}; --task-space chooses another one")
+        remarks.append(f"task space: {words}; --task-space chooses a different one")
     with name_task_file(None if task_space else source, keys):
         robot, task_map = bind(robot, space, tolerances)
         candidates = brachis.ik.find_all(robot, task_map)
@@ -154,7 +155,7 @@ def _problem_of(
     *,
     is_needed: bool,
 ) -> Problem | None:
-    """Check a task, and return None if it cannot be planned; `remarks` and `collisions` are filled with the reasons."""
+    """Return the problem of a task, or None if it cannot be planned; `remarks` and `collisions` get the reasons."""
     from brachis.problem.plausibility import check_within_reach, of_robot, of_task
     from brachis.problem.problem import Problem
     from brachis.robot.plausibility import report_issues
@@ -163,8 +164,8 @@ def _problem_of(
     try:
         collisions |= _collisions(robot, task)
         remarks += [
-            f"{' and '.join(pair)} are never free: they are too close in all of {MANY_POSTURES} random postures; if "
-            f"they may touch, add [{', '.join(pair)}] to collisions.disable"
+            f"{' and '.join(pair)} are never clear of each other: they are too close in all "
+            f"{MANY_POSTURES} random postures; if they may touch, add [{', '.join(pair)}] to collisions.disable"
             for pair in collisions["never_free"]
         ]
         problem = Problem.of(robot, task)
@@ -181,7 +182,7 @@ def _problem_of(
 def _describe(
     robot: Robot, problem: Problem | None, collisions: dict[str, list[Any]]
 ) -> dict[str, Any]:
-    """Describe robot and task as plain data for JSON. Free ends, and the length of a path of joints, are None."""
+    """Describe robot and task as plain data for JSON. Free ends, and the length of a joint path, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
     from brachis.task.fields import plain
@@ -211,7 +212,7 @@ def _describe(
 
 
 def _warnings(robot: Robot, problem: Problem | None) -> list[str]:
-    """List what is implausible, or raise PlausibilityError where a plan of the task would."""
+    """List implausible values, or raise PlausibilityError where planning the task would raise it."""
     from brachis.problem.plausibility import of_places, of_robot, of_task
     from brachis.robot.plausibility import refuse_issues
 
@@ -230,7 +231,7 @@ def _place_tool(
     task: Task | None,
     remarks: list[str],
 ) -> dict[str, Any]:
-    """Describe the tool's place in a frame of the task or in the world, with the keys of a task; add to `remarks`."""
+    """Describe the tool's place in a frame of the task or in the world, as keys of a task; add to `remarks`."""
     import numpy as np
     from scipy.spatial.transform import Rotation
 
@@ -316,7 +317,7 @@ def _print_robot(
 
 
 def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
-    """List the names of all solids of robot and scene, and of the pairs that may collide or always do."""
+    """List the names of all solids of robot and scene, of pairs that may collide, and of pairs that always do."""
     from brachis.scene import find_never_free, scene_of
 
     scene = scene_of(robot, task)
@@ -337,7 +338,8 @@ def _collisions(robot: Robot, task: Task) -> dict[str, list[Any]]:
 def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
     """List the name, type, axis, limits, mass and friction of every joint, with units.
 
-    The mass is that of the links between the joint and the next one. At the last joint it includes the payload.
+    The mass given for a joint is that of the links between this joint and the next one. For the last joint, the mass
+    includes the payload.
     """
     from brachis.robot.joints import UNITS, shown_unit
     from brachis.robot.limits import MAGNITUDES
@@ -381,7 +383,7 @@ def _robot_of_urdf(
     lock: Sequence[str],
     remarks: list[str],
 ) -> Robot:
-    """Make the robot of a URDF with the limits that the file states; missing limits are no error here.
+    """Create the robot of a URDF with the limits that the file states; missing limits are not an error here.
 
     Without a tool frame, the chain is the first limb of the URDF. `remarks` then name the other choices.
     """
@@ -396,12 +398,12 @@ def _robot_of_urdf(
         if limb.base and base_frame is None:
             base_frame = limb.base
             remarks.append(
-                f"base frame: {limb.base}, from which several limbs branch off; --base-frame chooses another one"
+                f"base frame: {limb.base}, from which several limbs branch off; --base-frame chooses a different one"
             )
         if len(limb.leaves) > 1:
             remarks.append(
                 f"tool frame: {limb.tool}, the last link before the chains to {', '.join(limb.leaves)} branch off; "
-                "--tool-frame chooses another one"
+                "--tool-frame chooses a different one"
             )
     locked = {}
     for text in lock:
@@ -451,7 +453,7 @@ def _decomposition(candidate: ik.TriedDecomposition) -> dict[str, Any]:
 
 
 def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
-    """Print a table of all choices, with the branches of those that have a solver and the reasons of the others."""
+    """Print a table of all choices, with the branches of choices that have a solver and the reasons for the others."""
     columns = ["redundant joints", "solver", "branches"]
     if any(row["remark"] for row in rows):
         columns.append("remark")
@@ -463,7 +465,7 @@ def _print_decompositions(rows: Sequence[dict[str, Any]]) -> None:
     if not is_verbose:
         omission = f"... and {len(rows) - len(shown)} more; " if rows != shown else ""
         print_lines(
-            f"{omission}--verbose lists the branches, and why choices have no closed form"
+            f"{omission}--verbose lists the branches, and why other choices have no closed form"
         )
         return
     for labels in dict.fromkeys(row["labels"] for row in rows if row["labels"]):

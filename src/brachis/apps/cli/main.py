@@ -1,6 +1,6 @@
-"""The command line: the list of all commands, and what happens when one fails.
+"""The command line: the list of all commands, and what happens when a command fails.
 
-Results go to standard output, everything else to standard error. With ``--json`` a command prints one JSON object on
+Results go to standard output, everything else to standard error. With ``--json``, a command prints one JSON object on
 standard output, even after an error. The exit codes are listed in `brachis.apps.cli.app`.
 """
 
@@ -30,7 +30,7 @@ from brachis.common import interrupts
 from brachis.errors import BrachisError
 
 _UsageError = cast("type[Exception]", typer.BadParameter.__bases__[0])
-"""Base class of the errors that Typer raises for wrong options. Typer does not export it."""
+"""Base class of the errors that Typer raises for wrong options. Typer does not export this class."""
 
 _UNWRITABLE = {errno.ENOSPC, errno.EPIPE, errno.EBADF, errno.EIO}
 """Error numbers that mean that a stream cannot be written."""
@@ -78,7 +78,7 @@ for _command in _COMMANDS:
 
 
 def main() -> None:
-    """Run the command line. No exception ends it with a traceback."""
+    """Run the command line. No exception ends the program with a traceback."""
     open_streams()
     try:
         code = copy_context().run(_run, as_json="--json" in sys.argv[1:])
@@ -95,7 +95,7 @@ def _run(*, as_json: bool) -> int:
     Raises
     ------
     OSError
-        Standard output cannot be written. Errors of other files carry a file name and are not raised.
+        Standard output cannot be written. Errors for other files carry a file name and are not raised.
     """
     try:
         return app(prog_name="brachis", standalone_mode=False) or 0

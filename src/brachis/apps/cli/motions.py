@@ -62,7 +62,7 @@ def verify(
     Parameters
     ----------
     urdf : path, optional
-        Check against this URDF, or included robot, instead of the saved one.
+        URDF file, or name of an included robot, to check against instead of the saved URDF.
 
     Examples
     --------
@@ -97,38 +97,39 @@ def export(
     time_tolerance: float = 0.01,
     json: Json = False,
 ) -> None:
-    """Sample a saved motion for a controller, or animate it.
+    """Sample a saved motion for a controller, or animate the motion.
 
     Parameters
     ----------
     out : path
-        File to write. Its suffix sets the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every joint; SI
-        units), .json, .yaml and .mcap (ROS 2's JointTrajectory), .script (URScript), .gif and .mp4.
+        File to write. The suffix of the file sets the format: .csv and .parquet (t, then q_, qd_, qdd_, tau_ of every
+        joint; SI units), .json, .yaml and .mcap (JointTrajectory of ROS 2), .script (URScript), .gif and .mp4.
     form : str, optional
         Name of the format: csv, parquet, json, ros2, mcap, urscript, gif or mp4.
     dt : float, optional
         Sampling period, s. Default: 0.001; 0.01 for ROS 2, 0.002 for URScript, 0.04 for animations.
     last : str, optional
         Time of the last sample. exact: the end time, even if it is not a multiple of the period. hold: the next
-        multiple of the period; the end posture is held until then. Default: exact; hold for URScript.
+        multiple of the period, with the end posture held until then. Default: exact, or hold for URScript.
     joints : str, optional
         Joints to write, in this order: j1,j2,... Default: all.
     slower : float, optional
-        How many times slower an animation shows the motion.
+        Factor by which an animation shows the motion slower.
     degrees : bool, optional
         Write angles in degrees.
     mm : bool, optional
         Write lengths in mm.
     profile : str, optional
-        Controller that the file is for: ros2_control, franka_1khz, ur_servoj_500hz, kuka_rsi_4ms, abb_egm_4ms,
-        fanuc_stream_8ms, staubli_val3, or a YAML file of your own. It sets axes, units and period, and the motion is
-        verified as the controller runs it. The suffix of its programs, such as .src, writes a program of positions.
+        Controller for which the file is written: ros2_control, franka_1khz, ur_servoj_500hz, kuka_rsi_4ms, abb_egm_4ms,
+        fanuc_stream_8ms, staubli_val3, or a YAML file of your own. The profile sets axes, units and period, and the
+        motion is verified as the controller runs it. With the suffix of the controller's programs, such as .src, a
+        program of positions is written.
     moves : str, optional
-        In programs of positions: joint or linear.
+        Kind of moves in programs of positions: joint or linear.
     tolerance : float, optional
-        Of programs: largest distance of the tool from the path, m and rad.
+        Maximum distance of the tool from the path in programs, m and rad.
     time_tolerance : float, optional
-        Of programs: largest difference in time, s.
+        Maximum difference in time in programs, s.
 
     Examples
     --------
@@ -258,13 +259,13 @@ def report(
 
 
 def _load(result: Path) -> tuple[Path, brachis.Trajectory]:
-    """Load a motion from its file or folder; returns the file too."""
+    """Load a motion from its file or folder; return the file as well."""
     result = motion_file(result)
     return result, brachis.Trajectory.load(result)
 
 
 def _inputs(result: Path, trajectory: brachis.Trajectory) -> list[Path]:
-    """Return the files that nothing made of a motion may overwrite: the motion's and its URDF."""
+    """Return the files that no output made from a motion may overwrite: its own file and its URDF."""
     urdf = trajectory.task.robot.urdf
     return [result, Path(urdf)] if urdf else [result]
 
@@ -278,14 +279,15 @@ def view(
 ) -> None:
     """Show a saved motion in the browser.
 
-    It shows robot, path, tool trace and ghost postures, and plots of the limits with a time slider. Ctrl-C ends it.
+    The viewer shows the robot, the path, the tool trace and ghost postures, and plots of the limits with a time slider.
+    Ctrl-C ends the viewer.
 
     Parameters
     ----------
     host : str, optional
-        Address that the viewer listens on; 0.0.0.0 lets other machines look.
+        Address that the viewer listens on; with 0.0.0.0, other machines can connect.
     port : int, optional
-        Port of the viewer; 0 for any free one. Default: the first free one from 8080 on.
+        Port of the viewer; 0 chooses any free port. Default: the first free port from 8080 on.
     browser : bool, optional
         Open the browser if there is a screen and a terminal.
 
@@ -313,11 +315,11 @@ def view(
 
 
 def show(viewer: Viewer, *, browser: bool = True) -> None:
-    """Show a motion until Ctrl-C; open the browser if it is wanted and there is a screen."""
+    """Show a motion until Ctrl-C; open the browser if this is wanted and there is a screen."""
     with viewer, interrupts.end_on_interrupt():
         if get_verbosity() is not Verbosity.QUIET:
             print_error("Ctrl-C stops the viewer")
-        typer.echo(f"look at {viewer.url}")  # what the command is for, however quiet
+        typer.echo(f"look at {viewer.url}")  # even if quiet
         has_screen = (
             sys.platform == "darwin"
             or os.environ.get("DISPLAY")
@@ -331,7 +333,7 @@ def show(viewer: Viewer, *, browser: bool = True) -> None:
 def _read_candidates(
     path: Path, trajectory: brachis.Trajectory
 ) -> list[dict[str, Any]]:
-    """Read the candidates of a motion's search from the JSON written with it; an empty list if it is another's."""
+    """Read the candidates of a motion's search from the JSON file beside it; none if it belongs to another motion."""
     try:
         data = json_library.loads(read_file(path.with_suffix(".json"), 64_000_000))
         same = math.isclose(data["t_end"], trajectory.t_end, rel_tol=1e-12)
@@ -344,7 +346,7 @@ def schema(
     out: Path | None = None,
     of: str = "task",
 ) -> None:
-    """Print the JSON schema of tasks, or of exported JSON.
+    """Print the JSON schema of task files, or of exported JSON files.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from brachis.verify import Verification
 
 _BEGAN = time.perf_counter()
-"""Time at which the command line was loaded, s. Verbose output counts the time of each step from here."""
+"""Time at which the command line was loaded, s. Verbose output counts the time of each step from this moment."""
 
 
 def print_table(
@@ -41,10 +41,10 @@ def print_table(
     *,
     numbers: Collection[str] = (),
 ) -> None:
-    """Print a table that fits the terminal. Text wraps; numbers are neither cut nor wrapped.
+    """Print a table that fits the terminal. Text is wrapped; numbers are neither cut nor wrapped.
 
-    A table that is too wide is printed without lines. If it is still too wide, its columns are spread over several
-    tables, each of which repeats the first column.
+    A table that is too wide is printed without lines. If the table is still too wide, its columns are spread over
+    several tables, each of which repeats the first column.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def print_table(
 
 
 def _split_columns(least: Sequence[int], width: int) -> list[list[int]]:
-    """Distribute the columns over tables without lines that fit the width. Each table has the first column."""
+    """Distribute the columns over tables without lines that fit the width. Each table contains the first column."""
     column_groups = [[0]]
     for i in range(1, len(least)):
         indices = [*column_groups[-1], i]
@@ -135,7 +135,7 @@ def print_verification(verification: Verification, *, degrees: bool) -> None:
 
 
 def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
-    """Print what a controller makes of a motion; return the exit code."""
+    """Print how a motion runs on a controller; return the exit code."""
     from brachis.apps.controller import RunReport
 
     remedies: tuple[str, ...] = ()
@@ -151,13 +151,13 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
         print_table("program", ("", ""), report.summary().items())
     if report.passed:
         return 0
-    reasons = ("the motion breaks limits as it is run", *report.failures)
+    reasons = ("the motion exceeds limits as it is run", *report.failures)
     print_error("\n".join([*reasons, *remedies]))
     return 1
 
 
 def print_segments(path: ToolPath) -> None:
-    """Print s and the distance from the path's start at which each of several segments ends, for a path of the tool."""
+    """Print, for a tool path of several segments, s and the distance from the path's start where each segment ends."""
     ends = {
         span.segment: f"path[{span.segment}] at s = {s:.4g} ({1e3 * path.between(0.0, s).length:.4g} mm)"
         for span, s in zip(path.spans, path.breaks[1:], strict=True)
@@ -168,7 +168,7 @@ def print_segments(path: ToolPath) -> None:
 
 
 def print_fit(fit: FitReport) -> None:
-    """Print what was read from a file of points, how close the fitted path is to the points, and its corners."""
+    """Print what was read from a file of points, how close the fitted path is to the points, and the path's corners."""
     print_lines(f"path from {fit}")
     if fit.corners:
         is_blended = any(corner.blend for corner in fit.corners)
@@ -189,7 +189,7 @@ def print_fit(fit: FitReport) -> None:
 
 
 def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
-    """Write a posture with joint names and units; None means that it is free."""
+    """Write a posture with joint names and units; None stands for a free posture."""
     from brachis.robot.joints import shown_unit
 
     if data[key] is None:
@@ -203,14 +203,14 @@ def write_posture(data: Mapping[str, Any], key: str, *, degrees: bool) -> str:
 
 
 def print_error(message: str) -> None:
-    """Print one message on standard error, if standard error can be written."""
+    """Print one message on standard error, if it can be written to."""
     with suppress(OSError):
         sys.stderr.write(f"brachis: {message}\n")
         sys.stderr.flush()
 
 
 def json_text(data: Mapping[str, object]) -> str:
-    """Return one JSON object as text. NaN and infinities, which JSON does not have, become null."""
+    """Return one JSON object as text. NaN and infinities, which JSON lacks, become null."""
     # The module json writes NaN and infinities as constants; here it reads them back as None.
     plain = json.loads(json.dumps(data), parse_constant=lambda _: None)
     return json.dumps(plain, indent=2) + "\n"
@@ -237,7 +237,7 @@ def print_failure(message: str, code: int, *, as_json: bool) -> int:
 
 
 def print_usage_error(error: Any, *, as_json: bool) -> int:
-    """Print why the command line was not understood and where to find help; return the exit code."""
+    """Print why the command line was not understood, and where to find help; return the exit code."""
     if type(error).__name__ == "NoArgsIsHelpError":
         with suppress(OSError):
             sys.stderr.write(f"{error.ctx.get_help()}\n")
@@ -252,7 +252,7 @@ def print_usage_error(error: Any, *, as_json: bool) -> int:
 def report_closed_output(error: OSError) -> None:
     """Say why standard output cannot be written, unless a pipe was closed.
 
-    The rest of the output goes to the null device, so that the interpreter does not try to write it at exit.
+    The rest of the output goes to the null device, so that the interpreter does not try to write this output at exit.
     """
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -261,7 +261,7 @@ def report_closed_output(error: OSError) -> None:
 
 
 def open_streams() -> None:
-    """Open both streams if they are closed, and let them print any file name."""
+    """Open standard output and standard error if they are closed, and let them print any file name."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this program
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  (open as long as the program runs)
@@ -288,7 +288,7 @@ def print_lines(*lines: str) -> None:
 
 
 def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None:
-    """Print an answer, either as JSON or as lines for a person."""
+    """Print a result, either as JSON or as lines for a person."""
     if as_json:
         print_json(data)
     else:
@@ -297,7 +297,7 @@ def print_answer(data: Mapping[str, object], *lines: str, as_json: bool) -> None
 
 @contextmanager
 def show_warnings() -> Iterator[None]:
-    """Print warnings of brachis as messages on standard error. A quiet command prints none."""
+    """Print warnings of brachis as messages on standard error. A quiet command prints no warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("default", BrachisWarning)
         usual = warnings.showwarning
@@ -317,8 +317,8 @@ def show_warnings() -> Iterator[None]:
 def show_progress() -> Iterator[Callable[[str], None]]:
     """Yield a listener that shows the current step and notices Ctrl-C.
 
-    On a terminal it shows only the current step. A verbose command prints every step with the time since the command
-    line was loaded.
+    On a terminal, the listener shows only the current step. A verbose command prints every step with the time since the
+    command line was loaded.
     """
     verbosity = get_verbosity()
     is_shown = verbosity is Verbosity.NORMAL
@@ -329,7 +329,7 @@ def show_progress() -> Iterator[Callable[[str], None]]:
     with console.status("working") as status:
 
         def show(text: str) -> None:
-            """Show the current step in the way that the verbosity asks for."""
+            """Show the current step as the verbosity requires."""
             interrupts.check()
             if verbosity is Verbosity.VERBOSE:
                 print_error(f"{time.perf_counter() - _BEGAN:.2f} s: {text}")

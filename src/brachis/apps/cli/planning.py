@@ -1,4 +1,4 @@
-"""``brachis plan | bottleneck | sweep``: plan a task, find what slows the motion down, plan a task many times."""
+"""``brachis plan | bottleneck | sweep``: plan a task, find out what slows the motion down, plan a task many times."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def plan(
     task : path
         Task file (YAML).
     out : path, optional
-        Folder for result.npz, result.json, overview.png and candidates.png, and for fit.png if the path was fitted to
-        points. If the verification fails, the file names begin with unverified.
+        Output folder for result.npz, result.json, overview.png and candidates.png, and for fit.png if the path was
+        fitted to points. If the verification fails, the file names begin with unverified.
     view : bool, optional
         Show the motion in the browser until Ctrl-C is pressed.
     profile : str, optional
-        Controller that runs the motion; see brachis export. Its limits are added to the task's, and the motion is
-        planned such that it passes as the controller runs it.
+        Controller that will run the motion; see brachis export. The limits of the controller are added to those of the
+        task, and the motion is planned so that it passes the verification as the controller runs it.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def _plan_task(
 
     keys = read_changes(changes, strict=strict)
     changed = load_changed_task(task, keys)
-    # If a URDF is given, the robot is not the one of the task file.
+    # If a URDF is given, the robot is not that of the task file.
     with name_task_file(None if urdf else task, keys):
         robot = urdf and str(urdf)
         if profile is None:
@@ -144,7 +144,7 @@ def _plan_task(
 
 
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
-    """Print the plan for a person."""
+    """Print the plan as text for a person."""
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
     from brachis.trajectory import PHASE_COLUMNS, phase_rows
 
@@ -196,8 +196,8 @@ def bottleneck(
 ) -> None:
     """Report which limits cost time.
 
-    The report says how much time each limit costs, and when it is active. A task is planned first; a saved motion is
-    used as it is.
+    The report says how much time each limit costs, and when the limit is active. If a task is given, it is planned
+    first; a saved motion is used as it is.
 
     Parameters
     ----------
@@ -207,9 +207,10 @@ def bottleneck(
         Solve again with each limit raised by 1 %, and compare the result with the prediction.
     reference : bool, optional
         Compare with a reference: the same problem on a fine mesh, with torque that may jump. The reference is the best
-        known value, not a proven bound. This takes some seconds.
+        end time known, not a proven bound. Computing it takes some seconds.
     out : path, optional
-        Folder for bottleneck.json and timeline.png. If the verification fails, the file names begin with unverified_.
+        Output folder for bottleneck.json and timeline.png. If the verification fails, the file names begin with
+        unverified_.
 
     Examples
     --------
@@ -269,17 +270,18 @@ def sweep(
     source : path
         Sweep file (YAML).
     out : path, optional
-        Folder for the plans, table.parquet, table.csv and sweep.png. Default: a folder with the name of the sweep file
-        in the current folder. An interrupted sweep continues there with the missing plans.
+        Output folder for the plans, table.parquet, table.csv and sweep.png. Default: a folder in the current folder,
+        with the name of the sweep file. An interrupted sweep continues in its folder with the missing plans.
     jobs : int, optional
         Number of processes. Default and maximum: the number of processors.
     part : str, optional
         Plan only part i of n, for example 2/8. On a cluster, each job of an array plans one part; all jobs use the same
         folder.
     merge : bool, optional
-        Plan nothing, but collect the plans of all parts in table.parquet and table.csv. A missing plan is an error.
+        Plan nothing, but collect the plans of all parts in table.parquet and table.csv. If a plan is missing, this
+        gives an error.
     retry : bool, optional
-        Plan failed plans again.
+        Run the failed plans again.
 
     Examples
     --------
@@ -316,7 +318,7 @@ def sweep(
 
 
 def _print_sweep(result: brachis.SweepResult, files: Sequence[str]) -> None:
-    """Print the result of a sweep for a person."""
+    """Print the result of a sweep as text for a person."""
     from brachis.common.summary import show_value
 
     summary = result.summary()

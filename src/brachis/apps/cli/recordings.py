@@ -27,7 +27,7 @@ from brachis.apps.cli.output import (
 from brachis.errors import InputError
 
 _FILES = ("today.npz", "result.npz", "comparison.json", "comparison.png")
-"""The recorded motion, the plan, the figures and the drawing."""
+"""Files for the recorded motion, the plan, the comparison and its drawing."""
 
 RecordedFile = Annotated[Path, Argument(metavar="CSV")]
 
@@ -86,7 +86,7 @@ def import_(
     print_lines(f"end time t_E: {trajectory.t_end:.4f} s", *recovered.told)
     print_verification(verification, degrees=degrees)
     print_lines(
-        "these ratios are of the motion interpolated from the rows; the rows alone prove:"
+        "these ratios belong to the motion interpolated between the rows; the rows alone prove:"
     )
     for proven in bound_ratios(trajectory):
         ratio, subject, instant = proven.worst
@@ -112,18 +112,20 @@ def compare(
 ) -> None:
     """Compare a recorded motion with a plan.
 
-    It is planned along the path of the recording; or, with --plan, it is the plan that was run.
+    A motion along the path of the recording is planned. With --plan, the recording is instead compared with the plan
+    that was run.
 
     Parameters
     ----------
     plan : path, optional
-        Result file (npz), or its folder, of the plan that was run: shows where the machine differed. Needs --profile.
+        Result file (npz) of the plan that was run, or its folder, to show where the machine differed from it. This
+        needs --profile.
     profile : str, optional
-        Controller whose axes and units the file has; see brachis export.
+        Controller whose axes and units the CSV file uses; see brachis export.
     keep_end : bool, optional
-        End in the recorded end posture, not in any posture with the tool there.
+        End in the recorded end posture. By default, any posture with the tool at the end of the path is allowed.
     out : path, optional
-        Folder for today.npz, result.npz, comparison.json and comparison.png.
+        Output folder for today.npz, result.npz, comparison.json and comparison.png.
 
     Examples
     --------

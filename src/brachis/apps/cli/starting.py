@@ -1,4 +1,4 @@
-"""``brachis robots | new | compose``: the commands that a new user begins with."""
+"""``brachis robots | new | compose``: the commands with which a new user begins."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def robots(json: Json = False) -> None:
         page = urdf.with_name("README.md").read_text(encoding="utf-8")
         what = page.splitlines()[0].partition(": ")[
             2
-        ]  # the heading is "# name: what it is"
+        ]  # the heading has the form "# name: what it is"
         joints = list(getattr(included, name).joint_names)
         listed.append({"name": name, "what": what, "joints": joints, "urdf": str(urdf)})
         rows.append((name, what, len(joints), ", ".join(joints)))
@@ -107,7 +107,7 @@ def new(
             "verified": result.verified,
         },
         f"wrote {out}: {robot.base_frame} -> {robot.tool_frame} with {', '.join(joints)}",
-        f"a quick plan of it was verified: the motion takes {result.t_end:.4f} s; next: brachis plan {out} --out out",
+        f"a quick plan was verified: the motion takes {result.t_end:.4f} s; next: brachis plan {out} --out out",
         as_json=json,
     )
 
@@ -140,7 +140,7 @@ def compose(
     arm : path
         URDF file of the arm, or the name of an included robot.
     travel : (2,) tuple of float
-        Lowest and highest position on the rail, m.
+        Minimum and maximum position on the rail, m.
     velocity : float
         Velocity limit of the rail, m/s.
     force : float
@@ -160,7 +160,7 @@ def compose(
     root : str, optional
         Name of the root link, which is the world frame.
     meshes : bool, optional
-        Whether the arm's meshes are kept or removed.
+        Keep the arm's meshes, or remove them.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Composing robots: mounting an arm on a linear axis, with the result as a plain URDF.
+"""Composing robots: mounting an arm on a linear axis, which gives a plain URDF.
 
 Examples
 --------
@@ -11,4 +11,4 @@ True
 from brachis.apps.compose.rail import Rail, on_rail
 
 __all__ = ["Rail", "on_rail"]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # what tab completion shows

@@ -1,4 +1,4 @@
-"""An arm on a linear axis. The arm's URDF is handled as XML, so that elements unknown to brachis stay as written."""
+"""An arm on a linear axis. The arm's URDF is handled as XML, so that elements unknown to brachis do not change."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ _FIGURES: dict[str, tuple[str, tuple[int, ...], Callable[[np.ndarray], Any]]] = 
     "mount_rpy": ("[roll, pitch, yaw] in rad", (3,), np.isfinite),
     "carriage_size": ("three lengths > 0 m", (3,), _is_positive),
 }
-"""Data of a rail: the allowed values in words, the shape, and a test of values, which must also be finite."""
+"""For every figure of a rail: the allowed values in words, the shape, and a test of the values. All must be finite."""
 
 
 def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
-    """Make file names of meshes and textures, given relative to the folder of `source`, relative to that of `target`.
+    """Rewrite names of mesh and texture files: from relative to the folder of `source` to relative to that of `target`.
 
-    Without `target` the names become absolute. Names that are already absolute do not change. Neither do names in
-    packages that ROS finds, or that cannot be found.
+    Without `target`, the names become absolute. Names that are already absolute do not change; nor do names in packages
+    that ROS finds, or that cannot be found.
     """
     old = source.parent.resolve()
     for element in robot.iter("mesh", "texture"):
@@ -76,32 +76,33 @@ def relocate_meshes(robot: Element, source: Path, target: Path | None) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rail:
-    """A linear axis with its carriage. Its data are never guessed.
+    """A linear axis with its carriage. All data of the axis are given; none are guessed.
 
     Attributes
     ----------
     range : (2,) sequence of float
-        Lowest and highest position on the rail, m.
+        Minimum and maximum position on the rail, m.
     velocity : float
         Velocity limit of the rail, m/s.
     force : float
-        Limit of the rail's drive force, N. This force accelerates carriage and arm, and holds them up on a rail that is
-        not horizontal.
+        Limit of the rail's drive force, N. The drive force accelerates the carriage and the arm, and holds them on a
+        rail that is not horizontal.
     mass : float
-        Mass of the carriage, kg, which is a solid box.
+        Mass of the carriage, kg. The carriage is a solid box.
     axis : (3,) sequence of float
-        Direction of the rail in the world frame, of any length except zero. The rail may be horizontal, vertical or
-        tilted.
+        Direction of the rail in the world frame, as a vector of any length except zero. The rail may be horizontal,
+        vertical or tilted.
     mount_xyz, mount_rpy : (3,) sequence of float
         Placement of the arm's root link on the carriage, m and rad (roll, pitch and yaw about the fixed axes x, y, z
         of the world frame). ``(pi, 0, 0)`` hangs the arm upside down, ``(0, pi / 2, 0)`` mounts it on a wall.
     carriage_size : (3,) sequence of float
         Lengths of the carriage, m, along the axes of the mounted arm's root link, whose origin is the centre of the
-        box's top. They are only drawn: the carriage never turns, so its moments of inertia do not matter.
+        box's top. The lengths are used only for drawing: the carriage never turns, so its moments of inertia do not
+        matter.
     name : str
-        Name of the joint, and prefix of the other new names.
+        Name of the rail's joint, and prefix of the names of the other new elements.
     root : str
-        Name of the root link.
+        Name of the new root link, which is the world frame.
 
     Raises
     ------
@@ -171,7 +172,7 @@ class Rail:
         return "\n".join((declaration, COMPOSED, body.removeprefix(f"{COMPOSED}\n")))
 
     def _check_names(self, arm: UrdfTree, source: Path, arm_root: str) -> None:
-        """Raise an error for new names that the arm already uses for links or joints; frames are looked up by name."""
+        """Raise an error for new names that the arm's links or joints already have; frames are looked up by name."""
         taken = dict.fromkeys(arm.joints, "joint") | dict.fromkeys(arm.links, "link")
         taken.pop(arm.root)
         new = {
@@ -215,7 +216,7 @@ class Rail:
         centre = write_origin(middle, self.mount_rpy)
         inertia = pin.Inertia.FromBox(self.mass, *self.carriage_size).inertia
         ixx, iyy, izz = inertia.diagonal()
-        # The name is new, because the arm may define a different grey.
+        # The material needs a new name, because the arm may define a different grey.
         grey = f'<material name="{self.name}_grey"><color rgba="0.35 0.38 0.42 1"/></material>'
         new = etree.fromstring(f"""
 <robot>
@@ -273,10 +274,10 @@ def on_rail(
 ) -> str:
     """Mount an arm on a linear axis and return the URDF of both.
 
-    The chain consists of link `rail.root` (the world frame), prismatic joint `rail.name`, link ``<name>_carriage``,
-    fixed joint ``<name>_mount``, and the arm's root link, from which on the arm is unchanged. If the arm's root link is
-    itself called `rail.root`, it is renamed to ``<name>_base``. At rail position p, m, the arm's root link lies at
-    ``p * axis + mount_xyz``, turned by `rail.mount_rpy`.
+    The chain consists of the link `rail.root` (the world frame), the prismatic joint `rail.name`, the link
+    ``<name>_carriage``, the fixed joint ``<name>_mount``, and the arm, which is unchanged from its root link on. If the
+    arm's root link is itself called `rail.root`, it is renamed to ``<name>_base``. At rail position p, m, the arm's
+    root link lies at ``p * axis + mount_xyz``, turned by `rail.mount_rpy`.
 
     Parameters
     ----------
@@ -284,16 +285,16 @@ def on_rail(
         URDF of the arm, without xacro macros.
     rail : Rail
     meshes : bool, optional
-        False removes all visuals and collisions of the arm that are meshes.
+        Whether to keep visuals and collisions of the arm that are meshes; False removes them.
     output : path, optional
         File to write. An older file is replaced if this function wrote it. Names of mesh files are relative to the
-        folder of this file, or absolute without `output`. Names in packages that ROS finds, or that cannot be found, do
-        not change.
+        folder of this file; without `output`, they are absolute. Names in packages that ROS finds, or that cannot be
+        found, do not change.
 
     Returns
     -------
     str
-        The URDF.
+        Text of the composed URDF.
 
     Raises
     ------
@@ -301,7 +302,7 @@ def on_rail(
         A name is already in use; or `output` cannot be written, or would overwrite the arm's URDF or another URDF that
         this function did not write.
     UrdfError
-        The arm's URDF is missing, broken, not one tree, or has bodies that are not physical.
+        The arm's URDF is missing, is broken, is not a single tree, or has bodies that are physically impossible.
 
     Examples
     --------
@@ -321,7 +322,7 @@ def on_rail(
             allowed="another file",
         )
     text = rail.mount(arm, source, target, meshes=meshes)
-    # On a moving axis even the inertia of the arm's root link matters, which no joint moved before.
+    # On a moving axis, the inertia of the arm's root link matters as well; before, no joint moved this link.
     composed = read_tree(text, str(source))
     carried = read_dynamics(composed, (rail.name,), {}, composed.root)
     check_inertias(composed, carried.bodies, str(source))

@@ -1,6 +1,6 @@
 """Figures of a trajectory. Each plot is one function in this package and one row of `PLOTS`.
 
-Every function returns a new Matplotlib figure. It uses neither pyplot nor Matplotlib's global settings. Matplotlib is
+Every function returns a new Matplotlib figure, and uses neither pyplot nor Matplotlib's global settings. Matplotlib is
 imported when the first figure is made.
 
 Examples
@@ -39,7 +39,10 @@ PLOTS: dict[str, Callable[[Trajectory], Figure]] = {
     "limits": plot_limits,
     "fit": plot_fit,
 }
-"""Plots of one trajectory, by name. `plot_comparison` compares many plans, `plot_candidates` draws a search."""
+"""Plots of one trajectory, by name.
+
+`plot_comparison` compares many plans; `plot_candidates` shows the results of a search.
+"""
 
 __all__ = [
     "PLOTS",
@@ -57,4 +60,4 @@ __all__ = [
     "plot_torques",
     "save_figure",
 ]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # what tab completion shows

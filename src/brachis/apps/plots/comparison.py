@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 Case = float | str
-"""What was planned: the value of a varied number, or a name."""
+"""Case that was planned: the value of a number that varies, or a name."""
 
 
 def plot_comparison(
@@ -33,22 +33,23 @@ def plot_comparison(
     rows : sequence of (case, choice, t_end)
         The case is what was planned (a direction, a payload, the name of a path, ...). The choice is what was chosen
         for it (redundant joints, a branch, a robot, ...). The end time is in s; NaN means that no plan was found.
-        Choices keep the order in which they first appear. So do cases, unless all of them are numbers, which are
-        sorted.
+        Choices keep the order in which they first appear. Cases do so as well, unless all of them are numbers; then
+        they are sorted.
     xlabel : str, optional
         Label of the axis of cases.
     unit : str, optional
-        Text appended to every case, including a leading space if one is wanted.
+        Text appended to every case. Begin it with a space if a space is wanted.
 
     Returns
     -------
     Figure
-        Two columns wide, with several panels if there are many cases. The shortest time of each case is in bold type.
+        Figure two columns wide, with several panels if there are many cases. The shortest time of each case is in bold
+        type.
 
     Raises
     ------
     InputError
-        `rows` is empty, a case is not finite, a time is not positive, or a pair of case and choice occurs twice.
+        `rows` is empty, a case is not finite, a time is not positive, or the same case and choice occur twice.
 
     Examples
     --------
@@ -122,7 +123,7 @@ def _draw_bars(
     choices: Sequence[str],
     cells: Mapping[tuple[Case, str], float],
 ) -> None:
-    """Draw one panel of grouped bars with their values above them. A pair without a row leaves a gap."""
+    """Draw one panel of grouped bars with their values above them. A case and choice without a row leave a gap."""
     width = 0.84 / len(choices)
     for column, choice in enumerate(choices):
         shift = (column - 0.5 * (len(choices) - 1)) * width
@@ -196,14 +197,14 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
     Returns
     -------
     Figure
-        Two columns wide; the row of the fastest candidate is at the top. An unfinished candidate is drawn at the least
-        time along its joint path, multiplied by the ratio of end time to least time of the fastest candidate. Finished
-        and unfinished candidates are therefore comparable.
+        Figure two columns wide; the row of the fastest candidate is at the top. An unfinished candidate is drawn at the
+        least time along its joint path, multiplied by the fastest candidate's ratio of end time to least time. Finished
+        and unfinished candidates can therefore be compared.
 
     Raises
     ------
     InputError
-        `candidates` is empty, or has entries that are not candidates.
+        `candidates` is empty, or contains something other than candidates.
     """
     check_list(candidates, "candidates", "candidates")
     if not candidates or not all(isinstance(entry, Candidate) for entry in candidates):
@@ -246,7 +247,7 @@ def plot_candidates(candidates: Sequence[Candidate]) -> Figure:
 
 
 def _row(candidate: Candidate) -> str:
-    """Name a candidate's choice of redundant joints and its branch."""
+    """Return the name of a candidate's row: its redundant joints and its branch."""
     name = coordinates(candidate.redundant_joints, candidate.branch)
     joints = "no redundant joint" if name == "none" else name
     is_named = candidate.branch not in {"", joints}
@@ -264,7 +265,8 @@ def plot_fit(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide, with one panel for each file or array to which the path was fitted. Dotted lines mark corners.
+        Figure one column wide, with one panel for each file or array to which the path was fitted. Dotted lines mark
+        corners.
 
     Raises
     ------
@@ -302,7 +304,7 @@ def plot_fit(trajectory: Trajectory) -> Figure:
 def _draw_error(
     ax: Axes, along: np.ndarray, errors: np.ndarray, tolerance: float, colour: int
 ) -> None:
-    """Draw the errors of a fit along the path, and their tolerance."""
+    """Draw the errors of a fit along the path, with their tolerance."""
     ax.plot(along, errors, linewidth=0.6, color=style.COLOURS[colour])
     ax.axhline(tolerance, linewidth=0.8, linestyle="--", color=style.COLOURS[colour])
     ax.set_ylim(0.0, 1.15 * tolerance)

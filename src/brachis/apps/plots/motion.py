@@ -37,12 +37,15 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import GridSpecBase, SubplotSpec
 
 _MOST_TICKS = 100
-"""Largest number of knots that are drawn as ticks. Hundreds would merge into a grey bar and take seconds."""
+"""Maximum number of knots that are drawn as ticks.
+
+Hundreds of ticks would merge into a grey bar and take seconds to draw.
+"""
 
 
 @of_motion
 def plot_motion(trajectory: Trajectory) -> Figure:
-    """Plot q, dq/dt, s, the tool's speed and the smallest distance of bodies over one time axis.
+    """Plot q, dq/dt, s, the tool's speed and the smallest distance between bodies over one time axis.
 
     Parameters
     ----------
@@ -51,8 +54,8 @@ def plot_motion(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion comes close
-        to them. The faint ticks are the knots of the splines.
+        Figure one column wide. Thin dashed lines are limits in the colours of their joints, drawn where the motion
+        comes close to them. The faint ticks are the knots of the splines.
     """
     rows = ("position", "velocity", "path coordinate", *tool_rows_of(trajectory))
     return _stack(trajectory, panels_of(trajectory, dense_samples(trajectory), *rows))
@@ -69,8 +72,8 @@ def plot_torques(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide. Joints without a limit are left out. If no joint has a limit, the torques themselves are shown,
-        with the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
+        Figure one column wide. Joints without a limit are left out. If no joint has a limit, the torques themselves are
+        shown, with the forces of prismatic joints in a panel below. The faint ticks are the knots of the splines.
 
     Raises
     ------
@@ -94,20 +97,20 @@ def plot_torques(trajectory: Trajectory) -> Figure:
 def plot_limits(
     trajectory: Trajectory, limits: Sequence[Limit] | None = None
 ) -> Figure:
-    """Plot the ratios to the limits of all kinds. For positions, the ratio is the place in the range.
+    """Plot the ratios to the limits of all kinds. For positions, the ratio shows the place within the range.
 
     Parameters
     ----------
     trajectory : Trajectory, Result or path
         Any motion, for example a saved one.
     limits : sequence of Limit, optional
-        Limits to compare with. Default: those of the trajectory's task.
+        Limits to compare with. Default: the limits of the trajectory's task.
 
     Returns
     -------
     Figure
-        One column wide, with a panel for every kind of limit and a line for every joint or other value that it limits.
-        Dashed lines are the limits. The faint ticks are the knots of the splines.
+        Figure one column wide, with a panel for every kind of limit and a line for every joint or other value that it
+        limits. Dashed lines are the limits. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -132,8 +135,8 @@ def plot_overview(trajectory: Trajectory) -> Figure:
     -------
     Figure
         The panels at the top right show the kinds of limits that are active longest, at most three. If no limit is
-        active, they show torques and forces, or accelerations if the URDF has no masses. The panels are those of
-        `plot_postures`, `plot_torques`, `plot_limits` and `plot_motion`.
+        active, these panels show torques and forces, or accelerations if the URDF has no masses. All panels also appear
+        in `plot_postures`, `plot_torques`, `plot_limits` or `plot_motion`.
     """
     samples = dense_samples(trajectory)
     columns = [
@@ -195,7 +198,7 @@ def _stack(trajectory: Trajectory, panels: Sequence[Panel]) -> Figure:
 
 
 def _height(panel: Panel) -> float:
-    """Return the height of a panel, mm. A panel with few curves is lower."""
+    """Return the height of a panel, mm. A panel with few curves is less high."""
     return 38.0 if len(panel.curves) > 2 else 24.0
 
 
@@ -225,7 +228,7 @@ def draw_panels(
 
 
 def _draw_panel(ax: Axes, panel: Panel) -> None:
-    """Draw one line for each curve, and the limits. Curves with the same limit share its dashes."""
+    """Draw one line for each curve, and the limits. Curves with the same limit share its dashed line."""
     for curve in panel.curves:
         label = style.plain(curve.name) if curve.style != BLACK else None
         ax.plot(panel.t, curve.values, label=label, **style.joint_style(curve.style))
@@ -247,14 +250,14 @@ def _draw_panel(ax: Axes, panel: Panel) -> None:
 
 
 def lines_of(axes: Sequence[Axes], trajectory: Trajectory) -> dict[str, Artist]:
-    """Collect one line of each subject that the axes show, by its label. Joints come first, in chain order."""
+    """Collect one line for each subject shown in the axes, by its label. Joints come first, in chain order."""
     lines = style.lines_by_label(axes)
     joints = [style.plain(name) for name in trajectory.joint_names]
     return {name: lines[name] for name in (*joints, *lines) if name in lines}
 
 
 def dress(ax: Axes, trajectory: Trajectory, ylabel: str) -> None:
-    """Set the labels with time to the right, and mark the splines' knots as faint ticks unless they would merge."""
+    """Set the labels, with time to the right, and mark the splines' knots as ticks unless they would merge."""
     style.dress(ax, r"$t$ (s)", ylabel)
     ax.set_xlim(0.0, trajectory.t_end)
     knots = knot_times(trajectory)[1:-1]
@@ -274,14 +277,14 @@ def plot_timeline(
     trajectory : Trajectory, Result or path
         Any motion, for example a saved one.
     limits : sequence of Limit, optional
-        Limits to compare with. Default: those of the trajectory's task.
+        Limits to compare with. Default: the limits of the trajectory's task.
 
     Returns
     -------
     Figure
-        Two columns wide, with a row for each limited value that ever uses more than half of its limit. Rows that hardly
-        change are left out. A deeper blue is closer to the limit. Orange: the limit is active, from 99 % of it on,
-        including ripple down to 95 %. The faint ticks are the knots of the splines.
+        Figure two columns wide, with a row for each limited value that ever uses more than half of its limit. Rows that
+        hardly change are left out. A deeper blue means closer to the limit. Orange means that the limit is active: at
+        99 % of it or more, including ripple down to 95 %. The faint ticks are the knots of the splines.
 
     Examples
     --------
@@ -301,7 +304,7 @@ def plot_timeline(
     figure = style.new_figure(style.PAGE_WIDTH, 26.0 + 5.0 * rows)
     ax = figure.add_subplot()
     orange = style.COLOURS[1]
-    thick = 0.84  # as a fraction of the distance between rows
+    thick = 0.84  # height of a bar, as a fraction of the distance between rows
     for row, entry in enumerate(entries):
         ratio = used[entry.label]
         cells = 0.5 * (ratio[1:] + ratio[:-1])[None]
@@ -331,7 +334,7 @@ def plot_timeline(
             ax,
             0.5,
             0.5,
-            "no limit is more than half used, except by constant ratios",
+            "no value uses more than half of its limit, apart from constant ones",
             ha="center",
         )
     blue = ScalarMappable(Normalize(0.0, 1.0), "Blues")

@@ -1,6 +1,6 @@
-"""The panels that plots, report and viewer draw of a motion: quantities over time, with their units and limits.
+"""The panels of a motion in plots, report and viewer: quantities over time, with their units and limits.
 
-A new panel needs one row of `PANELS`, and a function if its values are not among the samples.
+A new panel needs one row in `PANELS`, and a function if its values are not among the samples.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from brachis.scene.chain import Chain
 from brachis.trajectory import Samples, Trajectory
 
 MOST_CURVES = 10
-"""Largest number of curves in a panel of ratios."""
+"""Maximum number of curves in a panel of ratios."""
 BLACK = 48
-"""Style number of curves that belong to the whole arm. It gives a solid black line in all figures."""
+"""Style number of curves that belong to the whole arm: a solid black line in all figures."""
 
 CurveBound = np.ndarray | float
-"""A limit over time, (K,), or a constant one."""
+"""A limit over time, (K,), or a constant limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +33,12 @@ class PanelCurve:
     Attributes
     ----------
     name : str
-        Name of a joint, ``tool``, ...
+        Name of the curve's subject: a joint, ``tool``, ...
     style : int
         Number of the colour and dashes: the index of the joint, or `BLACK`.
     values : (K,) ndarray
     lower, upper : float or (K,) ndarray
-        Limits; infinite if there is none.
+        Limits of the values; infinite if there is none.
     is_range : bool
         Whether the limits are the ends of a range. The ratio is then 0 in the middle of the range; otherwise it is 0
         at zero.
@@ -58,7 +58,10 @@ class PanelCurve:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Ratios of the values to the limit in their direction, measured from the centre, (K,). Needs both limits."""
+        """Ratios of the values to the limit in their direction, measured from the centre, (K,).
+
+        The curve must have both limits.
+        """
         centre = 0.5 * self.lower + 0.5 * self.upper if self.is_range else 0.0
         away = self.values - centre
         return away / np.where(away > 0.0, self.upper - centre, centre - self.lower)
@@ -79,11 +82,11 @@ class Panel:
     t : (K,) ndarray
         Times, s.
     curves : tuple of PanelCurve
-        Joints in chain order.
+        The curves, with joints in chain order.
     ratio_title : str
         Title for the ratios of the values to their limits.
     is_ratio : bool
-        Whether the values are such ratios already.
+        Whether the values are already such ratios.
     ends : (float or None, float or None)
         Ends of the vertical axis; None for an end that follows from the values.
     """
@@ -99,12 +102,12 @@ class Panel:
 
     @property
     def heading(self) -> str:
-        """The title with the unit."""
+        """The title of the panel with its unit."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
     @property
     def label(self) -> str:
-        """The symbol with the unit."""
+        """The symbol of the panel with its unit."""
         return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
 
     @property
@@ -113,12 +116,12 @@ class Panel:
         return np.column_stack([curve.values for curve in self.curves])
 
     def near_limits(self) -> list[tuple[np.ndarray, list[PanelCurve]]]:
-        """List the limits to draw: for ratios all, otherwise those within 30 % of the motion's own range from it.
+        """List the limits to draw: all for ratios, otherwise those no further from the motion than 30 % of its range.
 
         Returns
         -------
         list of ((K,) ndarray, list of PanelCurve)
-            The limit over time, which is NaN where it is far away, and the curves that share it.
+            The limit over time, which is NaN where it is far from the motion, and the curves that share this limit.
         """
         reach = 0.3 * max(np.ptp(self.values), 1e-9)
         drawn: dict[bytes, tuple[np.ndarray, list[PanelCurve]]] = {}
@@ -134,7 +137,7 @@ class Panel:
         return list(drawn.values())
 
     def view(self) -> tuple[float, float]:
-        """Return the ends of the axis: `ends`, or those of the values and the limits close to them."""
+        """Return the ends of the axis: `ends`, or else the ends of the values and of the limits close to them."""
         limits = [line for line, _ in self.near_limits()]
         shown = np.column_stack([self.values, *limits])
         low = float(np.nanmin(shown))
@@ -154,13 +157,13 @@ class PanelRow:
     Attributes
     ----------
     values : callable
-        Function of trajectory and samples that returns (K, n) values for joints, otherwise (K,).
+        Function of trajectory and samples that returns the values: (K, n) for joints, otherwise (K,).
     symbol : str
         Symbol in Matplotlib's mathematical notation.
     prismatic : tuple of str
-        Title and symbol for prismatic joints, if they differ.
+        Title and symbol for prismatic joints, if these differ.
     is_range : bool
-        See `PanelCurve`.
+        Whether the limits are the ends of a range; see `PanelCurve`.
     needs_masses : bool
         Whether the values need the masses of the URDF.
     only_if_limited : bool
@@ -171,9 +174,9 @@ class PanelRow:
         Function of trajectory and samples that returns the smallest and the largest value that the task allows, each a
         number or (K,).
     name : str
-        Name of the curve, if the row has only one.
+        Name of the curve, if the row has only one curve.
     ends : (float or None, float or None)
-        See `Panel`.
+        Ends of the vertical axis; see `Panel`.
     """
 
     values: Callable[[Trajectory, Samples], np.ndarray]
@@ -191,7 +194,7 @@ class PanelRow:
 def _bound_tool_speed(
     trajectory: Trajectory, samples: Samples
 ) -> tuple[CurveBound, CurveBound]:
-    """Return minus infinity, and the largest tool speed that the task allows, (K,), m/s."""
+    """Return minus infinity, and the maximum tool speed that the task allows, (K,), m/s."""
     limit = build_tool_speed(trajectory.robot, trajectory.task)
     largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
     return -np.inf, largest
@@ -256,7 +259,7 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 
 
 def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
-    """Return the titles of the tool rows, with the clearance if the task checks collisions."""
+    """Return the titles of the tool rows, including the clearance if the task checks collisions."""
     scene = scene_of(trajectory.robot, trajectory.task)
     has_pairs = scene is not None and len(scene.pairs) > 0
     return ("tool speed", "clearance") if has_pairs else ("tool speed",)
@@ -265,7 +268,7 @@ def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 def panels_of(
     trajectory: Trajectory, samples: Samples, *names: str, degrees: bool = False
 ) -> list[Panel]:
-    """Make panels. Joints in rad and joints in m have separate panels.
+    """Make panels of a motion. Joints in rad and joints in m have separate panels.
 
     Parameters
     ----------
@@ -273,14 +276,14 @@ def panels_of(
     samples : Samples
         Samples of the trajectory.
     *names : str
-        Titles from `PANELS`.
+        Titles of the panels, from `PANELS`.
     degrees : bool, optional
-        Whether angles are in degrees.
+        Whether to show angles in degrees.
 
     Returns
     -------
     list of Panel
-        One or two for each row, with revolute joints first. Torques have none if there are no masses.
+        One or two panels for each row, with revolute joints first. Torques have no panel if there are no masses.
     """
     panels = []
     for name in names:
@@ -342,7 +345,7 @@ def ratio_panel(
 ) -> Panel:
     """Make a panel of the ratios to some kinds of limits. A subject has the same style in all such panels.
 
-    If there are many subjects, such as pairs of bodies, those that come closest to their limits are shown.
+    If there are many subjects, such as pairs of bodies, only the subjects that come closest to their limits are shown.
 
     Parameters
     ----------
@@ -351,7 +354,7 @@ def ratio_panel(
     *titles : str
         Kinds of limits, by the axis titles of their labels.
     symbol : str, optional
-        Title in Matplotlib's mathematical notation, if it is not in words.
+        Title in Matplotlib's mathematical notation, to be used in place of words.
     """
     subjects = [label.subject for label in ratios.labels]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
@@ -379,7 +382,7 @@ def ratio_panel(
 
 
 def at_distinct_times(ratios: LimitRatios) -> LimitRatios:
-    """Leave out the values just before jumps, so that no time occurs twice."""
+    """Return the ratios without the values just before jumps, so that no time occurs twice."""
     is_last = np.append(np.diff(ratios.t) > 0.0, True)
     return replace(ratios, t=ratios.t[is_last], values=ratios.values[is_last])
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return postures `q`, (K, n), as polylines in the world frame, (K, 2 n + 2, 3), m.
 
-    A polyline goes through the base, through every joint before and after its motion (the same point if the joint is
-    revolute), and to the tool.
+    A polyline goes from the base through every joint to the tool. Each joint has two points, before and after its
+    motion; for a revolute joint, they are the same.
     """
     model = robot.model
     base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
@@ -47,11 +47,11 @@ def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
     ----------
     robot : Robot
     axes : sequence of int
-        World axes of the task space's position rows. Two axes determine the plane; a single one leaves a choice.
+        World axes of the task space's position rows. Two axes determine the plane; a single axis leaves a choice.
     """
     chain = robot.chain
     sizes = np.abs(chain.axes)
-    # How far a joint's direction of motion is from that of a planar chain, for each normal.
+    # How far each joint's direction of motion is from that of a planar chain, for each possible normal.
     tilts = np.where(chain.revolute[:, None], 1.0 - sizes, sizes)
     is_normal = np.all(tilts < tolerances.LENGTH, axis=0)
     for normal in (2, 1, 0):
@@ -73,7 +73,7 @@ _VIEWS = tuple(
         (15.0, 22.0, 30.0), (-75.0, -65.0, -55.0, -45.0, -35.0, -25.0, -15.0)
     )
 )
-"""Elevations and azimuths among which the view of axes in space is chosen, degrees."""
+"""Elevations and azimuths, degrees, from which the direction of view of axes in space is chosen."""
 
 
 @of_motion
@@ -87,8 +87,8 @@ def plot_postures(trajectory: Trajectory) -> Figure:
     Returns
     -------
     Figure
-        One column wide, with equal scales. A planar chain is projected onto its plane; any other chain is drawn in
-        space. Later postures are darker. Squares are prismatic joints, and filled markers are redundant joints.
+        Figure one column wide, with equal scales. A planar chain is projected onto its plane; any other chain is drawn
+        in space. Later postures are darker. Squares are prismatic joints, and filled markers are redundant joints.
     """
     figure = style.new_figure(style.COLUMN_WIDTH, 80.0)
     place = figure.add_gridspec()[0]
@@ -100,7 +100,7 @@ def plot_postures(trajectory: Trajectory) -> Figure:
 def draw_postures(
     figure: Figure, trajectory: Trajectory, samples: Samples, place: SubplotSpec
 ) -> Axes:
-    """Draw tool path and postures into new axes, which show the robot's plane or space."""
+    """Draw the tool path and the postures into new axes, which show the robot's plane or space."""
     plane = plane_of(trajectory)
     in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
     ax: Any = figure.add_subplot(place, **in_space)
@@ -153,7 +153,7 @@ def plane_of(trajectory: Trajectory) -> tuple[int, int] | None:
 
 
 def _dress_space(ax: Any, points: np.ndarray, tool: np.ndarray) -> None:
-    """Set labels, equal scales and a floor for axes in space, seen from where points, (p, 3), fill the frame best.
+    """Set labels, equal scales and a floor for axes in space, viewed so that points, (p, 3), fill the frame best.
 
     The tool's path, (K, 3), casts a shadow on the floor.
     """

@@ -1,6 +1,6 @@
 """Settings and functions that all figures share: sizes, fonts, colours, axes, legends, files, notebooks.
 
-Everything is set on the individual figure. Matplotlib's global settings are not changed.
+All settings are made on the individual figure. Matplotlib's global settings are not changed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SUFFIXES = tuple(_METADATA)
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as png (300 dpi), pdf or svg, depending on the suffix of `path`.
+    """Write a figure as png (300 dpi), pdf or svg, according to the suffix of `path`.
 
     Fonts are embedded in pdf files as TrueType, as publishers require, and text remains text in svg files. The same
     figure always gives the same file.
@@ -43,7 +43,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     ----------
     figure : Figure
     path : path
-        File to write. An older figure of this format is replaced; if writing fails, it is kept.
+        File to write. An older figure of this format is replaced; if writing fails, the older figure is kept.
 
     Raises
     ------
@@ -59,14 +59,14 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
         "svg.fonttype": "none",
         "svg.hashsalt": "brachis",
     }
-    # These three can only be set globally; the context restores them.
+    # These three settings can only be made globally; the context restores them.
     beginning = BEGINNINGS[f".{suffix}"]
     with mpl.rc_context(fonts), atomic_write(path, beginning) as stream:
         figure.savefig(stream, format=suffix, dpi=_DPI, metadata=_METADATA[suffix])
 
 
 def check_suffix(path: str | os.PathLike[str]) -> str:
-    """Return the file format that the suffix of `path` stands for.
+    """Return the file format given by the suffix of `path`.
 
     Raises
     ------
@@ -131,7 +131,9 @@ LINE_WIDTH = 1.2
 """Width of data lines, points."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's colours, which colour-blind readers can distinguish. Yellow, too faint on white, is left out."""
+"""The colours of Okabe and Ito, which colour-blind readers can distinguish, without yellow, which is too faint on
+white.
+"""
 DASHES: tuple[tuple[float, ...], ...] = (
     (),
     (6.0, 1.6),
@@ -140,9 +142,9 @@ DASHES: tuple[tuple[float, ...], ...] = (
     (2.6, 1.2),
     (6.0, 1.3, 1.2, 1.3, 1.2, 1.3),
 )
-"""Dashes that differ in print without colours; one fewer than colours, so that the joints of long chains differ."""
+"""Dashes that differ in greyscale print. There is one fewer than colours, so that the joints of long chains differ."""
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----")
-"""Hatchings of bars, which differ in print without colours."""
+"""Hatchings of bars, which differ in greyscale print."""
 LIMIT: dict[str, Any] = {
     "linewidth": 0.7,
     "linestyle": (0, (4.0, 2.0)),
@@ -172,7 +174,7 @@ def joint_style(joint: int) -> dict[str, Any]:
 
 
 def limit_dashes(place: int, sharing: int) -> tuple[float, tuple[float, float]]:
-    """Return the line style of a limit that several joints share: each draws its dashes in the gaps of the others."""
+    """Return the line style of a limit that several joints share: each joint's dashes lie in the gaps of the others."""
     period = 6.0 * sharing
     return (period - 6.0 * place) % period, (4.0, period - 4.0)
 
@@ -190,7 +192,7 @@ def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
 
 
 def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> None:
-    """Draw a line where phases meet. With `labels`, also write the kind of each phase if there is room."""
+    """Draw a line wherever phases meet. With `labels`, also write the kind of each phase if there is room."""
     for phase in phases[:-1]:
         ax.axvline(phase.end, color=GREY, linewidth=0.6, linestyle=":", zorder=0.6)
     if not labels or len(phases) == 1:
@@ -229,7 +231,7 @@ def legend_above(
     ----------
     ax : Axes
     width : float
-        Available width, mm.
+        Width available for the legend, mm.
     lines : mapping of str to Artist, optional
         Entries of the legend. Default: the labelled artists of the axes.
     """
@@ -275,7 +277,7 @@ def _add_legend(
 
 
 def lines_by_label(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """Return the labelled artists of some axes, by label."""
+    """Return the labelled artists of several axes, by label."""
     return {
         label: line
         for ax in panels

@@ -1,8 +1,8 @@
-"""Import of a file of joint positions over time as a trajectory, like a planned one.
+"""Import of a file of joint positions over time as a trajectory, which can be used like a planned one.
 
 Forward kinematics gives dense samples of the tool's path, and a smooth curve is fitted to them within a tolerance. The
-path coordinate over time is a B-spline that does not decrease. Where the motion waits, the path stops and may have a
-corner.
+path coordinate over time is a B-spline that does not decrease. Where the motion waits, the path has a stop and may have
+a corner.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from brachis.trajectory import PhaseSpline, Recovered, Trajectory, join_splines
 from brachis.trajectory.recovered import LARGEST, check_tolerance
 
 _SURE = 3.0
-"""Assumed largest deviation of measured positions, in standard deviations."""
+"""Largest deviation assumed for measured positions, in standard deviations."""
 
 
 @check_keywords
@@ -67,9 +67,9 @@ def import_motion(
 ) -> Trajectory:
     """Turn a recorded motion into a trajectory that can be verified, drawn, compared and exported.
 
-    If the file has no velocities and accelerations, they come from polynomials through its positions. The tool's path
-    follows from forward kinematics, as a smooth curve within a tolerance. ``trajectory.recovered.told`` says what was
-    found in the file and what is unknown.
+    If the file has no velocities and accelerations, they are computed from polynomials through its positions. The
+    tool's path is computed by forward kinematics, as a smooth curve within a tolerance. ``trajectory.recovered.told``
+    says what was found in the file and what is unknown.
 
     Parameters
     ----------
@@ -77,20 +77,20 @@ def import_motion(
         CSV file whose first line names its columns: time (``t``, ``time_ms``, ...), joint positions (``j1``, ``q_j1``,
         ``j1_pos [deg]``, ...) and, if known, velocities (``qd_j1``, ``j1_vel``, ...). Other columns are ignored.
     robot : path, Robot or Task, optional
-        URDF file, name of a robot, or robot; or a task file, which is then used as `task`. Required unless the task
-        names a robot.
+        Robot, its name or its URDF file; or a task file, which is then used as `task`. Required unless the task names a
+        robot.
     task : path, mapping or Task, optional
-        Task whose robot, limits and settings are used. Its start and path are ignored.
+        Task whose robot, limits and settings are used. The start and the path of this task are ignored.
     task_space : str or sequence of str, optional
-        Task space of the path: rows, ``pose``, ``pose_free_roll`` or ``joints``. Default: that of the task; without a
-        task, the largest task space that the robot allows.
+        Task space of the path: rows, ``pose``, ``pose_free_roll`` or ``joints``. Default: the task space of the task
+        or, without a task, the largest one that the robot allows.
     units : mapping, optional
         ``{"angle": "deg", "length": "mm", "time": "ms"}`` for columns whose header states no unit. Default: rad, m, s.
     tolerance : float, optional
-        Tolerance of the path, m and rad. Default: 1e-6, or more if the file's last digits or the noise are coarser.
+        Tolerance of the path, m and rad. Default: 1e-6, or more if the digits in the file or the noise are coarser.
     noise : float or (n,) array_like, optional
         Standard deviation of measured positions, rad or m. The positions are smoothed accordingly. Default: the
-        standard deviation of rounding to the file's digits.
+        standard deviation due to rounding to the digits in the file.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def import_motion(
     PathError
         The tool follows no smooth path within the tolerance.
     InputError
-        Robot, task or task space is not valid.
+        The robot, the task or the task space is invalid.
 
     Examples
     --------
@@ -151,8 +151,8 @@ def import_motion(
         *recording.notes,
         *nodes.notes,
         "unknown: the motion between the rows, and the measured torques",
-        f"the tool's path comes from forward kinematics; the curve is at most {followed.miss:.1e} m or rad off",
-        f"its tolerance is {tolerance:.1e} m and rad",
+        f"the tool's path comes from forward kinematics; the fitted curve is at most {followed.miss:.1e} m or rad off",
+        f"the tolerance of the path is {tolerance:.1e} m and rad",
     )
     rows = np.pad(np.column_stack([t, recording.q]), ((0, 0), virtual))
     error = np.pad(error, virtual)
@@ -179,7 +179,7 @@ def import_motion(
 
 
 def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | None]:
-    """Return the robot with the settings of the task, and the task, which may be passed as `robot`."""
+    """Return the robot with the settings of the task, and the task, which may have been passed as `robot`."""
     if task is None and robot is not None and not is_robot(robot):
         task = robot  # type: ignore[assignment]
         robot = None
@@ -198,7 +198,7 @@ def _read_robot(robot: RobotOrTask, task: Source | None) -> tuple[Robot, Task | 
 def _join_coordinate(
     nodes: RecordedNodes, followed: RecoveredPath
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots and control points of s over time; s is constant during waits. See `join_splines`."""
+    """Return the knots and control points of s over time; s is constant during waits. See `join_splines`."""
     is_resting, _ = nodes.at_rest
     splines = [fit_coordinate(*followed.parts[0], is_resting=is_resting)]
     for (first, end), (t, s) in zip(followed.rests, followed.parts[1:], strict=True):
@@ -224,7 +224,7 @@ def joint_path_of(trajectory: Trajectory) -> tuple[Segment, ...]:
 
 @dataclass(frozen=True, eq=False)
 class RecoveredPath:
-    """A path recovered from a motion, and the path coordinate of the motion.
+    """A path recovered from a motion, and the path coordinate during the motion.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ class RecoveredPath:
     rests : list of (int, int)
         First and last node of each wait.
     parts : tuple of ((K,) ndarray, (K,) ndarray)
-        Dense times, s, and path coordinates of each part between waits.
+        Dense times, s, and path coordinates, for each part between waits.
     miss : float
         Largest distance of the tool from the path, m or rad.
     """
@@ -253,7 +253,7 @@ def recover_path(
     ------
     PathError
         The tool does not move, or does not follow a smooth path within the tolerance, for example because it changes
-        its direction without a wait.
+        its direction without waiting.
     """
     rests = find_rests(nodes)
     moves = split_at_rests(nodes, rests)
@@ -285,11 +285,11 @@ def _follow(
     -------
     list of Segment
     t : (K,) ndarray
-        Dense times, s.
+        Times at which this part is sampled densely, s.
     values : (K, c) ndarray
-        Task coordinates.
+        Task coordinates at these times.
     share : (K,) ndarray
-        Distance travelled since the part's beginning, as a fraction of its total.
+        Distance travelled since the beginning of the part, as a fraction of the part's length.
     """
     from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import BPoly
@@ -307,13 +307,13 @@ def _follow(
             "the tool does not move along a path",
             found=f"{length[-1]:.3g} m",
             where="path",
-            hint="Any motion can be imported with the task space joints",
+            hint="With the task space joints, any motion can be imported",
         )
     values = task_map.values(q)
     chosen = _choose_evenly(length)
     share = (
         0.5 * tolerance
-    )  # the other half is for s over time and for the path between the points
+    )  # the other half of the tolerance is for s over time and for the path between the points
     allowed = FitTolerance(position=share, orientation=share)
     file = PointFile(file="the recorded motion", tolerance=allowed, corner="refuse")
     points = _points(task_map, values[chosen], chosen)
@@ -332,7 +332,7 @@ def _follow(
 
 
 def _tool_speed(task_map: TaskMap, q: np.ndarray, qdot: np.ndarray) -> np.ndarray:
-    """Return the speed of the tool's position, (K,), which is 0 in joint space."""
+    """Return the speed of the tool's position, (K,); in joint space, it is 0."""
     rates = np.einsum("kmn,kn->km", task_map.jacobian(task_map.twists(q)), qdot)
     return task_map.norms(rates)[0]
 
@@ -348,7 +348,7 @@ def _choose_evenly(length: np.ndarray) -> np.ndarray:
 
 
 def _points(task_map: TaskMap, values: np.ndarray, rows: np.ndarray) -> Points:
-    """Make points from task coordinates, (K, c)."""
+    """Turn task coordinates, (K, c), into the points of a path to be fitted."""
     count = len(task_map.axes) if task_map.angles else values.shape[1]
     turning = values[:, count:]
     if len(task_map.angles) > 1:
@@ -368,7 +368,7 @@ def _nearest(
     share: np.ndarray,
     ends: tuple[float, float],
 ) -> np.ndarray:
-    """Return the ascending path coordinates closest to task coordinates, (K, c), beginning from shares of the way."""
+    """Return the ascending path coordinates closest to task coordinates, (K, c); initial guesses come from `share`."""
     s = np.interp(share, [0.0, 1.0], ends)
     for _ in range(4):
         sample = path.sample(s)
@@ -391,9 +391,9 @@ def fit_coordinate(t: np.ndarray, s: np.ndarray, *, is_resting: bool) -> PhaseSp
     Parameters
     ----------
     t, s : (K,) ndarray
-        Ascending.
+        Times, s, and path coordinates; both are ascending.
     is_resting : bool
-        Whether ds/dt vanishes at the ends of the path. At waits, which begin between rows, it is only close to zero.
+        Whether ds/dt vanishes at the ends of the path. At waits, which begin between rows, ds/dt is only close to zero.
     """
     from scipy.interpolate import splrep
 
@@ -447,7 +447,7 @@ def _task_of(
     segments: Sequence[Segment],
     space: str | Sequence[str],
 ) -> Task:
-    """Make the task that the motion fulfils."""
+    """Make the task that the recorded motion carries out."""
     is_resting, is_calm = nodes.at_rest
     content: dict[str, Any] = {
         "brachis": 1,

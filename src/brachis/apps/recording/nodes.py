@@ -1,20 +1,21 @@
 """Conversion of recorded positions to a motion that is twice continuously differentiable.
 
-Derivatives at a row are those of a polynomial through five neighbouring rows. Among the windows of five rows that
-contain the row, the one whose polynomial bends least is used (essentially non-oscillatory interpolation: A. Harten,
+The derivatives at a row are those of a polynomial through five neighbouring rows. Of all windows of five rows that
+contain this row, the window whose polynomial bends least is used (essentially non-oscillatory interpolation: A. Harten,
 B. Engquist, S. Osher, S. R. Chakravarthy, Journal of Computational Physics 71, 1987). Where accelerations jump, as they
 do in time-optimal motions, a spline through all rows would overshoot by a fifth of the jump and ring on both sides.
 Velocities and accelerations from the file are used instead if they agree with these derivatives.
 
-Positions that are measured, or rounded to few digits, have no meaningful second derivatives. They are replaced by a
-smoothing spline.
+Positions that are measured, or rounded to few digits, have no meaningful second derivatives. Such positions are
+replaced by a smoothing spline.
 
-A jump of the acceleration between two rows is found from the motion on both sides. A quintic piece from a row before a
-jump to a row after it overshoots by up to a tenth of the jump. If the motion is continued from both rows at constant
-jerk, the two velocities meet where the jump is (subcell resolution: A. Harten, Journal of Computational Physics 83,
-1989). There the acceleration changes from one side's value to the other's within a small fraction of the period.
+A jump of the acceleration between two rows is located from the motion on both sides. A quintic piece from a row before
+a jump to a row after it overshoots by up to a tenth of the jump. If the motion is continued from both rows at constant
+jerk, the two velocities meet at the jump (subcell resolution: A. Harten, Journal of Computational Physics 83, 1989).
+There, the acceleration is made to change from the value on one side to the value on the other within a small fraction
+of the period.
 
-A recorded motion waits where several rows have the same posture. Between the waits it moves along the path.
+A recorded motion waits where several rows have the same posture. Between its waits, such a motion moves along the path.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ _TINY = np.finfo(float).tiny
 _DEGREE = 5
 """Degree of smoothing splines."""
 _AT_REST = {1: 1e-3, 2: 1e-2}
-"""Fractions of the largest velocity (1) and acceleration (2) below which those at an end count as zero."""
+"""Fractions of the largest velocity (1) and acceleration (2) below which their values at an end count as zero."""
 _NARROWEST = 0.02
-"""Half of the shortest fraction of a period within which the acceleration changes at a jump."""
+"""Half of the smallest fraction of a period within which the acceleration changes at a jump."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +48,11 @@ class RecordedNodes:
     Attributes
     ----------
     t : (L,) ndarray
-        Times, s.
+        Times of the nodes, s.
     states : (3, L, n) ndarray
-        q, qdot and qddot.
+        Joint positions q, velocities qdot and accelerations qddot at the nodes.
     notes : tuple of str
-        How velocities and accelerations were found.
+        Notes on how velocities and accelerations were found.
     """
 
     t: np.ndarray
@@ -60,22 +61,22 @@ class RecordedNodes:
 
     @property
     def q(self) -> np.ndarray:
-        """Positions, (L, n)."""
+        """Joint positions at the nodes, (L, n)."""
         return self.states[0]
 
     @property
     def qdot(self) -> np.ndarray:
-        """Velocities, (L, n)."""
+        """Joint velocities at the nodes, (L, n)."""
         return self.states[1]
 
     @property
     def qddot(self) -> np.ndarray:
-        """Accelerations, (L, n)."""
+        """Joint accelerations at the nodes, (L, n)."""
         return self.states[2]
 
     @property
     def at_rest(self) -> tuple[bool, bool]:
-        """Whether both ends are at rest, and whether their accelerations also vanish."""
+        """Whether the motion is at rest at both ends, and whether its accelerations also vanish there."""
         ends = [0, -1]
         return not self.qdot[ends].any(), not self.qddot[ends].any()
 
@@ -117,13 +118,13 @@ def nodes_of(recording: Recording, deviation: np.ndarray) -> RecordedNodes:
 
 
 def _smooth(t: np.ndarray, q: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Return positions and three derivatives of smoothing splines, (4, K, n); NaN for joints without one."""
+    """Return positions and three derivatives of smoothing splines, (4, K, n); NaN for joints without a spline."""
     states = np.full((4, *q.shape), np.nan)
     bends = np.maximum(np.abs(np.diff(q, n=2, axis=0)).max(axis=0), _TINY)
     # In a quintic piece of 1 s, a position error of 1 rad gives an acceleration of 60 rad/s^2.
     rounding = 60.0 * deviation / bends
-    # Rounding noise, relative to the largest acceleration, above which positions are smoothed: first only if a spline
-    # explains them, then in any case.
+    # Rounding noise, relative to the largest acceleration, above which positions are smoothed. Above the first level,
+    # they are smoothed only if a spline explains them; above the second, always.
     for threshold, in_any_case in ((1e-3, False), (0.2, True)):
         is_rough = rounding > threshold
         if is_rough.any():
@@ -138,7 +139,7 @@ def _interpolate(recording: Recording, joints: np.ndarray) -> tuple[np.ndarray, 
     """Return positions and three derivatives, (4, K, j), of some joints, and a note on how they were found."""
     states = _differentiate(recording.t, recording.q[:, joints])
     note = (
-        "velocities and accelerations are those of polynomials through five rows each"
+        "velocities and accelerations are those of polynomials, each through five rows"
     )
     rates = ((1, recording.qdot, "velocities"), (2, recording.qddot, "accelerations"))
     for order, recorded, words in rates:
@@ -161,12 +162,12 @@ def _differentiate(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     h = float(np.median(np.diff(t)))
     windows = np.arange(count - FEWEST_ROWS + 1)[:, None] + np.arange(FEWEST_ROWS)
     powers = np.arange(FEWEST_ROWS)
-    # Bend of the polynomial through every five rows, each joint relative to its own range.
+    # Bending of the polynomial through every five rows, with each joint relative to its own range.
     around = (t[windows] - t[windows].mean(axis=1, keepdims=True)) / h
     highest = np.linalg.solve(around[:, :, None] ** powers, values[windows])[:, -1]
     ranges = np.maximum(np.ptp(values, axis=0), _TINY)
     bends = (np.abs(highest) / ranges).max(axis=1)
-    # Among the windows that contain a row, the one centred on it is used unless others bend much less.
+    # Of the windows that contain a row, the window centred on the row is used unless another one bends much less.
     before = FEWEST_ROWS - 1
     padded = np.pad(bends, before, constant_values=np.inf)
     containing = np.lib.stride_tricks.sliding_window_view(padded, FEWEST_ROWS)
@@ -184,11 +185,12 @@ def _differentiate(t: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _fit_rows(
     t: np.ndarray, q: np.ndarray, deviation: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Fit a least-squares spline with the minimum number of intervals that explains the rows (K, n); see `_fit_spline`.
+    """Fit a least-squares spline to rows (K, n), with the minimum number of intervals that explains them.
 
-    At each end as many derivatives vanish as the rows allow: none, the velocity, or also the acceleration.
+    At each end, as many derivatives vanish as the rows allow: none, the velocity, or the velocity and the acceleration.
+    See `_fit_spline`.
     """
-    # Add intervals until the spline is about as far off as noise alone would be, which is 1.
+    # Add intervals until the spline is about as far from the rows as noise alone would be, which is 1.
     count = 4.0
     while True:
         states, off = _fit_spline(t, q, deviation, int(count), 0, 0)
@@ -204,7 +206,7 @@ def _fit_rows(
 def _count_vanishing(
     t: np.ndarray, q: np.ndarray, deviation: np.ndarray, largest: np.ndarray
 ) -> int:
-    """Count the derivatives that vanish at an end, where t is 0, by polynomials through the rows close to it."""
+    """Count the derivatives that vanish at an end, where t is 0, with polynomials through the rows close to it."""
     is_away = (np.abs(q - q[0]) > 220.0 * deviation).any(axis=1)
     first = int(np.argmax(is_away)) if is_away.any() else len(t)
     count = max(8, first) + 1
@@ -246,7 +248,7 @@ def _fit_spline(
     rows = np.arange(len(t))
     breaks = np.interp(np.linspace(0.0, rows[-1], count + 1), rows, t)
     knots = np.pad(breaks, _DEGREE, mode="edge")
-    # Derivatives vanish at an end where its control points are equal, so these follow from the free ones.
+    # Derivatives vanish at an end if its control points are equal, so these control points follow from the free ones.
     points = np.arange(len(knots) - _DEGREE - 1)
     columns = np.clip(points - first, 0, points[-1] - first - last)
     tied = csr_array((np.ones(len(points)), (points, columns)))
@@ -313,10 +315,10 @@ def _overshoots(t: np.ndarray, states: np.ndarray, scale: np.ndarray) -> np.ndar
 def _place_jump(
     before: np.ndarray, after: np.ndarray, h: float, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return two nodes in a period h between which the acceleration changes from the value before to the one after.
+    """Return two nodes in a period h, between which the acceleration changes from the value before to the value after.
 
-    The middle of the change is where the velocities continued from both sides agree best. If accelerations differ by D,
-    a steady change within a time w leads D w^2 / 24 further than a jump in its middle.
+    The middle of the change is where the velocities continued from both sides agree best. If the accelerations differ
+    by D, a steady change within a time w leads D w^2 / 24 further than a jump at the middle of this time.
 
     Parameters
     ----------
@@ -324,18 +326,18 @@ def _place_jump(
         Position and three derivatives at both ends of the period.
     h : float
     scale : (n,) ndarray
-        Largest accelerations.
+        Largest acceleration of each joint.
 
     Returns
     -------
     (2,) ndarray
-        Times after the beginning of the period.
+        Times of the nodes after the beginning of the period, s.
     (3, 2, n) ndarray
-        Positions and two derivatives.
+        Positions and two derivatives at the nodes.
     """
 
     def gap(place: Any, order: int) -> Any:
-        """Return the difference of both sides' derivatives at fractions of the period, relative to `scale`."""
+        """Return the difference between the two sides' derivatives at fractions of the period, relative to `scale`."""
         t = np.asarray(place)[..., None] * h
         difference = extrapolate(after, t - h)[order] - extrapolate(before, t)[order]
         return difference / scale
@@ -354,7 +356,8 @@ def _place_jump(
     last = place * h + 0.5 * width
     begin = extrapolate(before, first)
     end = extrapolate(after, last - h)
-    # The node closer to its row is exact. From it the acceleration changes to that of the other at constant jerk.
+    # The node closer to its row is exact. From there, the acceleration changes at constant jerk to that of the other
+    # node.
     jerk = (end[2] - begin[2]) / width
     if place <= 0.5:
         end = extrapolate([*begin, jerk], width)
@@ -370,7 +373,7 @@ def find_rests(nodes: RecordedNodes) -> list[tuple[int, int]]:
     """
     speed = np.abs(nodes.qdot).max(axis=1)
     same = np.all(np.abs(np.diff(nodes.q, axis=0)) <= tolerances.ROUNDING, axis=1)
-    slow = speed <= 1e-3 * speed.max()  # up to this speed it is rounding
+    slow = speed <= 1e-3 * speed.max()  # motion up to this speed is due to rounding
     still = np.concatenate([[False], same & slow[1:] & slow[:-1], [False]])
     edges = np.flatnonzero(np.diff(still))
     last = len(nodes.t) - 1

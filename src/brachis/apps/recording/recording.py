@@ -27,7 +27,7 @@ _UNITS: Final = {
     "mm": ("length", LENGTHS),
     "nm": ("torque", {"nm": 1.0, "n": 1.0}),
 }
-"""The quantity of each SI unit, and the units that a file may use for it, with their factors."""
+"""The quantity that each SI unit measures, and the units that a file may use for this quantity, with their factors."""
 _TIME_COLUMNS = ("t", "time", "timestamp")
 _JOINT_COLUMNS: Final = {
     "tau": "tau_{0} torque_{0} effort_{0} {0}_tau {0}_torque {0}_effort",
@@ -35,7 +35,10 @@ _JOINT_COLUMNS: Final = {
     "qdot": "qd_{0} dq_{0} v_{0} vel_{0} velocity_{0} {0}_vel {0}_velocity",
     "q": "{0} q_{0} pos_{0} position_{0} {0}_pos {0}_position",
 }
-"""Column names of joint ``{0}``. A name that appears in several rows has the meaning of the last one."""
+"""Column names of joint ``{0}``.
+
+A name that appears in several rows has the meaning given in the last of these rows.
+"""
 _QUANTITIES: Final = {
     "t": ("time", ""),
     "q": ("position", ""),
@@ -51,11 +54,11 @@ _NAME_AND_UNIT = re.compile(
 FEWEST_ROWS = 5
 """Minimum number of rows of a motion: derivatives come from a polynomial through five rows."""
 _STILL = 1e-12
-"""If rows have all digits, a joint that moves less than this between them stands still, rad or m."""
+"""Motion between two rows, rad or m, below which a joint stands still if the file has all digits."""
 
 
 def check_units(units: object) -> dict[str, str]:
-    """Check the units that the user states for ``angle``, ``length`` and ``time``; drop those that are None.
+    """Check the units that the user states for ``angle``, ``length`` and ``time``; drop entries that are None.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def check_units(units: object) -> dict[str, str]:
 
 
 Columns = dict[tuple[str, str], tuple[int, str | None]]
-"""Index of each column and the unit that its header states, by quantity and joint (an empty string for time)."""
+"""Index of each column, and the unit that its header states, by quantity and joint (an empty string for time)."""
 
 
 def _allowed_columns(joints: Sequence[str]) -> str:
@@ -118,7 +121,7 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
         if key is not None and not is_other:
             columns[key] = (i, unit)
     with_torques = {joint for kind, joint in columns if kind == "tau"}
-    if with_torques != set(joints):  # torques of some joints are left out
+    if with_torques != set(joints):  # torques that only some joints have are left out
         columns = {key: column for key, column in columns.items() if key[0] != "tau"}
     kinds = dict.fromkeys(["q", *(kind for kind, joint in columns if joint)])
     required = [("t", ""), *((kind, joint) for kind in kinds for joint in joints)]
@@ -147,7 +150,7 @@ def _read_column(
     base: str,
     units: Mapping[str, str],
 ) -> tuple[np.ndarray, str, float]:
-    """Return a column in SI units, (K,), its unit in the file, and half its last digit in SI units.
+    """Return a column in SI units, (K,), its unit in the file, and half a unit of its last digit in SI units.
 
     Parameters
     ----------
@@ -155,16 +158,16 @@ def _read_column(
     column : (int, str or None)
         Index of the column, and the unit that its header states.
     kind : str
-        One of the `_QUANTITIES`.
+        Quantity in the column, a key of `_QUANTITIES`.
     base : {"s", "rad", "m"}
         SI unit of time, or of the joint's position.
     units : mapping
-        Units that the user states.
+        Units of angles, lengths and times that the user states.
 
     Raises
     ------
     TaskError
-        A unit is unknown, or the header and the user contradict each other.
+        A unit is unknown, or the header and the user state different units.
     """
     i, stated = column
     name, factors = _UNITS[base]
@@ -205,7 +208,7 @@ class HasJoints(Protocol):
 
     @property
     def position_units(self) -> tuple[str, ...]:
-        """``rad`` or ``m`` of each joint."""
+        """Unit of each joint's position, ``rad`` or ``m``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,23 +218,23 @@ class Recording:
     Attributes
     ----------
     t : (K,) ndarray
-        Times, beginning with 0, s.
+        Times of the rows, beginning with 0, s.
     q : (K, n) ndarray
-        Positions, rad or m.
+        Joint positions, rad or m.
     qdot, qddot : (K, n) ndarray or None
-        Velocities and accelerations if the file has them, rad/s or m/s, rad/s^2 or m/s^2.
+        Velocities, rad/s or m/s, and accelerations, rad/s^2 or m/s^2, if the file has them.
     rounding : (n,) ndarray
-        Half of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
+        Half a unit of the last digit of every joint's positions, rad or m; 0 if the file has all digits.
     units : tuple of str
         Unit of every joint's positions: rad or m.
     source : str
-        Name of the file.
+        Name of the file that was read.
     notes : tuple of str
         Notes on how the file was read.
     tau : (K, n) ndarray or None
-        Torques if the file has them, Nm or N.
+        Torques, Nm or N, if the file has them.
     begin : float
-        Time of the first row that is kept, after the file's first row, s.
+        Time of the first row that is kept, after the first row of the file, s.
     """
 
     t: np.ndarray
@@ -251,15 +254,15 @@ def read_recording(
 ) -> Recording:
     """Read a CSV file of times and joint positions, with velocities and accelerations if it has them.
 
-    Rows before and after the motion, in which the robot stands still, are left out.
+    Rows before and after the motion are left out, because the robot stands still in them.
 
     Parameters
     ----------
     path : path
     robot : Robot or ControllerAxes
-        Robot whose joints, or axes, the columns are named after.
+        Robot, or axes of a controller, after whose joints the columns are named.
     units : mapping
-        Units of ``angle``, ``length`` and ``time`` in columns whose header states none.
+        Units of ``angle``, ``length`` and ``time`` in columns whose header states no unit.
 
     Raises
     ------
@@ -375,8 +378,8 @@ def _check_angles(q: np.ndarray, robot: Robot, source: Path) -> None:
 def _first_row(t: np.ndarray, q: np.ndarray, rounding: np.ndarray) -> int:
     """Return the row at which the motion begins; the number of rows if nothing moves.
 
-    If the file has few digits, a gentle motion has already gone on for a while when the last digit changes. It grows as
-    the cube of time, so it is eight times as large after twice the time.
+    If the file has few digits, a gentle motion has already continued for a while when the last digit changes. The
+    travel of such a motion grows as the cube of time, so it is eight times as large after twice the time.
     """
     away = np.abs(q - q[0])
     # A flickering last digit changes by 2 roundings; 24 roundings are a dozen such changes.

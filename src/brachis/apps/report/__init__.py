@@ -1,4 +1,4 @@
-"""A report on a motion: one HTML file from which a person decides whether to run the motion.
+"""A report on a motion: one HTML file with the information needed to decide whether to run the motion.
 
 Examples
 --------
@@ -12,4 +12,4 @@ Examples
 from brachis.apps.report.page import Report, check_report_name, make_report
 
 __all__ = ["Report", "check_report_name", "make_report"]
-__dir__ = __all__.copy  # what completion shows
+__dir__ = __all__.copy  # what tab completion shows

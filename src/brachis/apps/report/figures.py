@@ -1,4 +1,4 @@
-"""The interactive Plotly figures of a report, and its animation of stick figures."""
+"""The interactive Plotly figures of a report, and the data of its stick-figure animation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Figure = dict[str, Any]
 
 
 def encode(values: np.ndarray) -> dict[str, Any]:
-    """Write an array in the form that Plotly reads: single precision, base64."""
+    """Encode an array in the form that Plotly reads: single precision, base64."""
     data = base64.b64encode(values.astype("<f4").tobytes()).decode()
     return {"dtype": "f4", "shape": ",".join(map(str, values.shape)), "bdata": data}
 
@@ -38,7 +38,8 @@ def motion_figure(motion: ReportedMotion) -> Figure:
     """Draw positions and their derivatives, torques and forces, and the tool's speed, with their limits.
 
     Joints in rad and joints in m have separate panels. The reader can hide a joint in all panels at once. Torques and
-    forces are also shown as ratios to their limits, because those of a wrist are much smaller than those of a shoulder.
+    forces are also shown as ratios to their limits, because the torques of a wrist are much smaller than those of a
+    shoulder.
     """
     trajectory = motion.trajectory
     samples = motion.samples
@@ -72,7 +73,7 @@ def motion_figure(motion: ReportedMotion) -> Figure:
 def _traces(
     panel: Panel, curve: PanelCurve, axis: str, *, is_named: bool
 ) -> list[dict[str, Any]]:
-    """Draw one curve and its limits. The page draws limits thin and dashed."""
+    """Draw one curve and its limits. The page shows limits as thin dashed lines."""
     look = style.joint_style(curve.style)
     shared = {"yaxis": axis, "name": curve.name, "legendrank": curve.style}
     hover = f"%{{y:.4g}} {panel.unit}".rstrip()
@@ -114,7 +115,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
     shares = np.array([used[entry.label] for entry in entries])
     colours = shares.copy()
     for row, entry in zip(colours, entries, strict=True):
-        for active in entry.active:  # ripple included
+        for active in entry.active:  # including ripple
             inside = (ratios.t >= active.begin) & (ratios.t <= active.end)
             row[inside] = np.maximum(row[inside], THRESHOLD)
     heat = {
@@ -128,7 +129,7 @@ def timeline_figure(motion: ReportedMotion) -> Figure:
 
 
 def _layout(trajectory: Trajectory, height: int) -> dict[str, Any]:
-    """Return a layout with one time axis and this total height of the panels, pixels. The page sets the style."""
+    """Return a layout with one time axis and the given total height of the panels, pixels. The page sets the style."""
     return {"height": height + 110, "xaxis": {"range": [0.0, trajectory.t_end]}}
 
 
@@ -138,9 +139,10 @@ def scene(motion: ReportedMotion) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``t``, ``s``, ``speed`` (of the tool) at K times; ``bones``, (K, p, 3), m; ``plane``, the two world axes of a
-        planar robot's plane, or None; ``joints``, with ``name``, ``redundant`` and, for every quantity, the values with
-        their unit and their ratios to the limits; ``levels``, the ratios above which values are marked.
+        ``t``, ``s``, ``speed`` (of the tool) at K times; ``bones``, the polylines of the arm, (K, p, 3), m; ``plane``,
+        the two world axes of a planar robot's plane, or None; ``joints``, each with ``name``, ``redundant`` and, for
+        every quantity, the values with their unit and their ratios to the limits; ``levels``, the ratios above which
+        values are marked.
     """
     trajectory = motion.trajectory
     samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 240))

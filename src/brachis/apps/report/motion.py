@@ -43,7 +43,7 @@ class ReportedMotion:
     held_back : tuple of str
         Sentences that say what slows the motion down.
     remarks : tuple of Issue
-        Implausible values of robot and task.
+        Implausible values found in the robot and the task.
     guarantees : dict of str to str
         Text that says where each limit is met, by the name of the limit.
     degrees : bool
@@ -51,7 +51,7 @@ class ReportedMotion:
     not_completed : tuple of str
         Steps that the search did not complete.
     candidates : tuple of Candidate
-        Candidates of the search; none for a saved motion.
+        Candidates of the search; empty for a saved motion.
     planned : dict of str to str
         How the motion was planned, if known.
     """
@@ -93,7 +93,7 @@ def reported_motion(
         report = bottleneck.report(motion)
     except BrachisError as error:
         report = bottleneck.report(motion, solve=False)
-        unknown = [f"What the limits cost is unknown: {error}"]
+        unknown = [f"The cost of the limits is unknown: {error}"]
     held_back = (*report.text(degrees=degrees).splitlines(), *unknown)
     samples = dense_samples(trajectory)
     rows = joint_rows_of(trajectory)
@@ -111,7 +111,7 @@ def reported_motion(
 
 
 def _describe_plan(result: PlannedMotion) -> dict[str, Any]:
-    """Return the report's entries that are known only for a freshly planned motion."""
+    """Return the entries of the report that are known only for a newly planned motion."""
     report = result.solver_report
     least = result.least_motion
     not_completed = result.not_completed

@@ -1,4 +1,4 @@
-"""The report as one self-contained HTML file: all data, pictures and programs are in it."""
+"""The report as one self-contained HTML file, which contains all data, pictures and programs."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Report:
     verified: bool
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the page to a file. An older report is replaced; if writing fails, it is kept.
+        """Write the page to a file. An older report is replaced; if writing fails, the older report is kept.
 
         Raises
         ------
@@ -59,7 +59,7 @@ class Report:
     @property
     def content(self) -> bytes:
         """Content of the file."""
-        # File names are not always valid text.
+        # File names in the page are not always valid Unicode.
         return self.html.encode(errors="backslashreplace")
 
     def __repr__(self) -> str:
@@ -79,18 +79,18 @@ def check_report_name(path: str | os.PathLike[str]) -> None:
     ------
     InputError
     """
-    check_suffix(path, ".html", "A browser prints it as PDF")
+    check_suffix(path, ".html", "A browser can print the HTML file as PDF")
 
 
 def make_report(
     motion: PlannedMotion | Trajectory, *, title: str = "", degrees: bool = False
 ) -> Report:
-    """Make a page from which a person decides whether to run a motion.
+    """Make a page that helps a person to decide whether to run a motion.
 
     Parameters
     ----------
     motion : Result or Trajectory
-        A result of `brachis.plan`; or a trajectory, for example a loaded one, which is verified again.
+        A result of `brachis.plan`, or a trajectory, for example from a file. A trajectory is verified again.
     title : str, optional
         Title of the page. Default: the robot's name, or "motion" if it has none.
     degrees : bool, optional
@@ -135,7 +135,7 @@ def make_report(
 
 
 def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
-    """Yield captions and pictures, which can be printed and need no JavaScript."""
+    """Yield captions and pictures; the pictures can be printed and need no JavaScript."""
     trajectory = reported.trajectory
     caption = "Overview of the motion. Dashed lines are limits; faint ticks are the knots of the splines."
     yield caption, as_html(plot_overview(trajectory))
@@ -148,7 +148,7 @@ def _pictures(reported: ReportedMotion) -> Iterator[tuple[str, str]]:
 
 
 def _template() -> Any:
-    """Read the page's template, including its style and program.
+    """Read the template of the page, including its style and program.
 
     Inserted text is escaped unless the template marks it as safe.
     """

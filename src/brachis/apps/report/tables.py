@@ -1,4 +1,4 @@
-"""The tables of a report, with words, and numbers with their units."""
+"""The tables of a report, as text and as numbers with units."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from brachis.task import Task
 from brachis.trajectory import phase_rows
 
 NEAR = 0.9
-"""Ratio to a limit above which a value is marked as close to it; 1 is the limit itself."""
+"""Ratio to a limit above which a value is marked as close to this limit; 1 is the limit itself."""
 _LISTED = 6
-"""Largest number of segments of a path, and of numbers in a segment, that are written out."""
+"""Maximum number of segments of a path, and of numbers in a segment, that are written out."""
 
 
 def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
@@ -36,7 +36,7 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     branch = trajectory.branch
     named = {} if branch in {"", CHART} else {"branch": branch}
     fastest = np.argmax(samples.tool_speed)
-    ends = "goes round for ever" if boundary.periodic else "from rest to rest"
+    ends = "repeats without end" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
         first, last = samples.tool_speed[[0, -1]]
         ends = f"begins with the tool at {first:.3f} m/s and ends with it at {last:.3f} m/s"
@@ -100,7 +100,7 @@ def describe_path(task: Task) -> str:
 
 
 def _write_entry(value: object) -> str:
-    """Write an entry of a segment. Long lists and mappings are replaced by their length."""
+    """Write an entry of a segment. A long list or mapping is replaced by its length."""
     nested = (list, tuple, dict)
     if isinstance(value, float):
         return f"{value:.4g}"
@@ -112,7 +112,7 @@ def _write_entry(value: object) -> str:
 
 
 def task_text(task: Task) -> str:
-    """Write a task as YAML, with file names but without their folders, which mean nothing to other readers."""
+    """Write a task as YAML, with file names but without folders, which mean nothing to other readers."""
     return yaml.safe_dump(_without_folders(task.to_dict()), sort_keys=False)
 
 
@@ -146,7 +146,7 @@ def what_limits(motion: ReportedMotion) -> str:
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
-    """List the phases, each with its active limits. The list is empty for a motion with one phase."""
+    """List the phases, each with its active limits. For a motion with only one phase, the list is empty."""
     phases = limits_by_phase(motion.trajectory, motion.saturations)
     rows = phase_rows(motion.trajectory.phases)
     if len(rows) == 1:
@@ -162,8 +162,8 @@ def joint_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
     list of dict
         ``name``; ``redundant``; the positions ``start`` and ``end``, and the range ``travel`` from the lowest to the
         highest position, with their unit. ``peaks`` has an entry for every kind of quantity: the extreme ``value`` with
-        its unit; the ``limit`` and the ``share`` of it that is used, both empty without a limit; and the ``level``,
-        which is ``beyond``, ``at``, ``near`` or empty.
+        its unit; the ``limit`` and the used ``share`` of this limit, both empty if there is no limit; and the
+        ``level``, which is ``beyond``, ``at``, ``near`` or empty.
     """
     trajectory = motion.trajectory
     tolerance = trajectory.task.refinement.tolerance
@@ -213,7 +213,7 @@ def _write_number(value: float) -> str:
 
 
 def check_rows(motion: ReportedMotion) -> list[dict[str, Any]]:
-    """List the checks of the verification in words. Failed checks come first."""
+    """List the checks of the verification as text. Failed checks come first."""
     rows = []
     for check in sorted(motion.verification.checks, key=lambda check: check.passed):
         figure, allowed, unit = check.figures(degrees=motion.degrees)

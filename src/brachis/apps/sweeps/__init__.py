@@ -1,4 +1,4 @@
-"""Sweeps: a task is planned many times, with keys varied over grids, rows and random draws."""
+"""Sweeps: planning a task many times, with its keys varied over grids, rows and random draws."""
 
 from brachis.apps.sweeps.result import SweepResult
 from brachis.apps.sweeps.run import sweep

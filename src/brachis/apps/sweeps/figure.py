@@ -1,4 +1,4 @@
-"""The figure of a sweep: end times over one key or two."""
+"""The figure of a sweep: end times over one or two keys."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HEIGHT = 62.0
-"""Height of the figure for each key, mm."""
+"""Height of the figure per key, mm."""
 _MOST_TICKS = 12
-"""Largest number of names along one axis, and of cells along one axis of a heat map that shows times as text."""
+"""Maximum number of names along an axis, and of cells along an axis of a heat map that shows times as text."""
 _COLOURS = "viridis"
 _END_TIME = r"$t_\mathrm{E}$ (s)"
 
@@ -40,7 +40,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
     Returns
     -------
     Figure
-        Crosses mark values for which no plan is verified.
+        Figure in which crosses mark values for which no plan is verified.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def plot_sweep(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Figure
 def _find_fastest(
     rows: Sequence[Mapping[str, Any]], keys: Sequence[str]
 ) -> dict[tuple[Any, ...], float]:
-    """Find the least time for each combination of the keys' values, s; NaN if no plan is verified."""
+    """Find the shortest end time, s, for each combination of the keys' values; NaN if no plan is verified."""
     cells: dict[tuple[Any, ...], float] = {}
     for row in rows:
         cell = tuple(row[key] for key in keys)
@@ -127,9 +127,9 @@ def _find_fastest(
 def _locate(
     column: Sequence[Any], *, side_by_side: bool
 ) -> tuple[np.ndarray, list[Any]]:
-    """Return the positions of values on an axis, and the labels written there instead of numbers.
+    """Return the positions of values on an axis, and the labels to write there instead of numbers.
 
-    Numbers lie at their own value. Other values, and all values of a heat map, lie side by side.
+    Numbers are placed at their own value. Other values, and all values of a heat map, are placed side by side.
     """
     distinct = list(dict.fromkeys(column))
     if all(type(value) in {int, float} for value in distinct):
@@ -141,7 +141,7 @@ def _locate(
 
 
 def _draw_heat_map(ax: Axes, x: np.ndarray, y: np.ndarray, times: np.ndarray) -> Any:
-    """Draw cells at whole numbers x and y, with NaN empty. Small maps show the times as text."""
+    """Draw cells at whole numbers x and y; cells with NaN are empty. Small maps show the times as text."""
     grid = np.full((int(y.max()) + 1, int(x.max()) + 1), np.nan)
     grid[y.astype(int), x.astype(int)] = times
     image = ax.imshow(grid, cmap=_COLOURS, aspect="auto", origin="lower")

@@ -1,4 +1,7 @@
-"""Reading a sweep file, listing its plans, and making a plan. A plan is recognised by all that decides its outcome."""
+"""Reading a sweep file, listing its plans, and running a plan.
+
+A plan is recognised by all the data that decide its outcome.
+"""
 
 from __future__ import annotations
 
@@ -37,18 +40,18 @@ from brachis.task.yaml_reader import read_yaml
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A plan in the form in which it is sent to a worker, which needs no file.
+    """A plan as it is sent to a worker, which then needs no files.
 
     Attributes
     ----------
     digest : str
-        Hash of all other attributes, 16 hexadecimal digits. Equal plans are made only once.
+        Hash of all other attributes, 16 hexadecimal digits. Equal plans are run only once.
     task : Task
         Task, with the content of all its files.
     urdf : str
-        Text of the URDF.
+        Text of the robot's URDF.
     version : str
-        Version of brachis.
+        Version of brachis that is to run the plan.
     """
 
     digest: str
@@ -81,7 +84,7 @@ class PlanOutcome:
     def of_error(
         cls, error: BaseException, wall_time: float | None = None, *, message: str = ""
     ) -> PlanOutcome:
-        """Return the outcome of a failed plan, with the message of the error unless another is given."""
+        """Return the outcome of a failed plan, with the error's message unless a different one is given."""
         kind = type(error).__name__
         facts = {
             "status": FAILED,
@@ -93,7 +96,7 @@ class PlanOutcome:
 
 
 SweepRow = tuple[Mapping[str, Any], Plan | BrachisError]
-"""One row of the sweep's table: the values of the varied keys, and the plan, or an error if the task is not valid."""
+"""One row of the sweep's table: the values of the varied keys, and the plan, or an error if the task is invalid."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ class SweepPlan:
     ----------
     settings : SweepSettings
     base : mapping
-        The task, which is not checked yet.
+        Content of the task, which has not been checked yet.
     rows : tuple of SweepRow
     """
 
@@ -128,8 +131,8 @@ def load_sweep(source: str | os.PathLike[str] | Mapping[str, Any]) -> SweepPlan:
     Raises
     ------
     TaskError
-        The sweep or its task is not valid; or a key is an error in all plans that set it. If only some values of a key
-        are errors, their plans become rows with the error.
+        The sweep or its task is invalid, or a key causes an error in all plans that set it. If only some values of a
+        key cause errors, their plans become rows with the error.
     """
     content: object = source
     name = "sweep"
@@ -177,7 +180,7 @@ def _plan(
             raise TaskError(
                 "the robot is missing",
                 where=f"{name}: robot.urdf",
-                hint="Set it to the path of the URDF",
+                hint="Set this key to the path of the URDF",
             )
         urdf = read_file(Path(task.robot.urdf))
     except BrachisError as error:
@@ -186,7 +189,8 @@ def _plan(
     search = task.search.model_copy(update={"jobs": 1})
     task = task.model_copy(update={"search": search})
     known = task.to_dict()
-    known["robot"].pop("urdf", None)  # the text of the URDF matters, not its place
+    # Only the text of the URDF matters, not its location.
+    known["robot"].pop("urdf", None)
     said = json.dumps([known, urdf, brachis.__version__], sort_keys=True)
     digest = hashlib.sha256(said.encode()).hexdigest()[:16]
     return Plan(digest, task, urdf, brachis.__version__)
@@ -202,7 +206,7 @@ def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) ->
 
     @cache
     def find_error(plan: Plan | BrachisError) -> BrachisError | None:
-        """Return the error of a task that is not valid or that has an unknown name."""
+        """Return the error of a task that is invalid or contains an unknown name."""
         if isinstance(plan, BrachisError):
             return plan
         try:
@@ -219,22 +223,22 @@ def _check_keys(settings: SweepSettings, rows: Sequence[SweepRow], name: str) ->
         plans.sort(key=lambda plan: isinstance(plan, BrachisError))
         if all(map(find_error, plans)):
             refused[key] = (
-                f"an error in every plan that sets it ({len(plans)}); the first: {find_error(plans[0])}"
+                f"an error in every plan that sets this key ({len(plans)}); the first: {find_error(plans[0])}"
             )
     if refused:
-        # One wrong key makes the plans of all other keys fail.
+        # A single wrong key makes the plans of all other keys fail as well.
         named = [key for key, text in refused.items() if key in text]
         key = (named or [*refused])[0]
         raise TaskError(refused[key], where=f"{name}: {key}")
 
 
 def robot_of(plan: Plan) -> Robot:
-    """Make the robot of a plan without reading a file."""
+    """Create the robot of a plan without reading a file."""
     return robot_from_settings(plan.task.robot, urdf_text=plan.urdf)
 
 
 def run_plan(plan: Plan) -> PlanOutcome:
-    """Make a plan. This function is called by workers.
+    """Run a plan. Workers call this function.
 
     Raises
     ------
@@ -260,7 +264,7 @@ def run_plan(plan: Plan) -> PlanOutcome:
             path = Path(folder) / "motion.npz"
             result.save(path)
             motion = path.read_bytes()
-    except Exception as error:  # noqa: BLE001  (one of thousands of plans must not end the others)
+    except Exception as error:  # noqa: BLE001  (a failure of one plan among thousands must not end the others)
         return PlanOutcome.of_error(error, time.perf_counter() - began)
     remarks = [str(warning) for warning in result.warnings]
     remarks += [f"not completed: {step}" for step in result.not_completed]

@@ -1,6 +1,6 @@
-"""Pools in which plans are made: processes on this machine, or the executor of a cluster.
+"""Pools that run plans: processes on this machine, or the executor of a cluster.
 
-A pool receives plans and yields each plan with its outcome as soon as it is finished, in any order.
+A pool receives plans, and yields each plan with its outcome as soon as the plan is finished, in any order.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ Pool = Callable[[Sequence[Plan]], Outcomes]
 AHEAD = 2
 """Number of plans that are handed out for each process, so that no process waits for its next plan."""
 HEARTBEAT = 1.0
-"""Time after which Ctrl-C or the end of the parent process is noticed, s."""
+"""Longest time until Ctrl-C or the end of the parent process is noticed, s."""
 _POLL = 0.02
 """Time between two checks for finished plans, s. Plans take tenths of a second or more."""
-_CONTINUES = "Finished plans are stored; run the same sweep again to make the others"
+_CONTINUES = "Finished plans are stored; run the same sweep again to run the others"
 _ENDED = "every worker process ended during this plan: a crash, or too little memory"
 _ONE_THREAD = dict.fromkeys(
     (
@@ -45,19 +45,19 @@ _ONE_THREAD = dict.fromkeys(
 
 
 def pool_for(jobs: int | None, executor: Executor | None) -> Pool:
-    """Return the pool in which plans are made.
+    """Return the pool that runs the plans.
 
     Parameters
     ----------
     jobs : int or None
-        Number of processes on this machine. None means as many as it has processors.
+        Number of processes on this machine. None means as many as the machine has processors.
     executor : Executor or None
-        Executor that makes the plans instead of processes on this machine.
+        Executor that runs the plans instead of processes on this machine.
 
     Raises
     ------
     InputError
-        Both are given, or one is not valid.
+        Both are given, or one of them is invalid.
     """
     if executor is None:
         workers = None if jobs is None else count(jobs, "jobs")
@@ -78,8 +78,8 @@ def as_completed(
 ) -> Iterator[tuple[Plan, PlanOutcome]]:
     """Hand out plans, up to `width` at a time, and yield their outcomes.
 
-    Plans that were running when a process ended are made again, one at a time, to find out which plan ends it. Futures
-    of some clusters have only ``done``, ``exception``, ``result`` and ``cancel``.
+    Plans that were running when a process ended are run again, one at a time, to find out which plan ends its process.
+    Futures of some clusters have only ``done``, ``exception``, ``result`` and ``cancel``.
     """
     waiting = iter(plans)
     suspects = deque[Plan]()
@@ -136,7 +136,7 @@ def _outcome_of(future: Future[PlanOutcome]) -> PlanOutcome:
 
 
 def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
-    """Make plans with an executor, which receives all of them at once.
+    """Run plans with an executor, which receives all of them at once.
 
     Yields
     ------
@@ -145,7 +145,7 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
     Raises
     ------
     ClusterError
-        The workers ended, cannot be reached, or cannot run brachis.
+        The workers have ended, cannot be reached, or cannot run brachis.
     """
     try:
         yield from as_completed(
@@ -158,16 +158,17 @@ def on_executor(plans: Sequence[Plan], executor: Executor) -> Outcomes:
 
 
 def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
-    """Make plans in processes on this machine.
+    """Run plans in processes on this machine.
 
-    A plan that ends its process (too little memory, a crash) fails. Plans that were running at the same time are made
-    again.
+    A plan fails if it ends its process (by a crash, or for lack of memory). Plans that were running at the same time
+    are run again.
 
     Parameters
     ----------
     plans : sequence of Plan
     jobs : int or None
-        Largest number of processes. There are never more than processors or plans. None means as many as possible.
+        Maximum number of processes, which is also limited by the numbers of processors and plans. None means as many as
+        possible.
 
     Yields
     ------
@@ -188,7 +189,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
     def submit(plan: Plan) -> Future[PlanOutcome]:
         """Hand out a plan, and start new processes if the old ones ended."""
         nonlocal processes
-        with interrupts.block_in_children():  # this may start processes
+        with interrupts.block_in_children():  # submitting a plan may start processes
             try:
                 return processes.submit(run_plan, plan)
             except BrokenExecutor:
@@ -203,7 +204,7 @@ def in_processes(plans: Sequence[Plan], jobs: int | None) -> Outcomes:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this worker process soon after its parent, because a killed parent cannot end its workers."""
+    """End this worker process soon after its parent ends, because a killed parent cannot end its workers."""
 
     def watch() -> None:
         """Wait for the end of the parent process."""

@@ -1,8 +1,8 @@
-"""The result of a sweep: its folder, in which every finished plan has its own files, and the table of all plans.
+"""The result of a sweep: the folder, in which every finished plan has its own files, and the table of all plans.
 
-``plans/3f/3f0a....parquet`` is one row of the table, and ``plans/3f/3f0a....npz`` is its motion. Files are written
-under temporary names and then renamed, so that they are complete or missing. The motion is written first, so that every
-row belongs to a finished plan.
+``plans/3f/3f0a....parquet`` contains one row of the table, and ``plans/3f/3f0a....npz`` the motion of this row. Files
+are written under temporary names and then renamed, so that a file is either complete or missing. The motion is written
+before the row, so that every row belongs to a finished plan.
 """
 
 from __future__ import annotations
@@ -48,7 +48,10 @@ COLUMNS = {
     "remarks": "string",
     "motion": "string",
 }
-"""Columns of an outcome, with Arrow types. Times are in s. The path error is the larger of the values in m and rad."""
+"""Columns of an outcome, with Arrow types.
+
+Times are in s. The path error is the larger of its two values in m and in rad.
+"""
 TABLE = "table"
 """File name of the table of all plans, without its suffix."""
 _ABOUT = "sweep.json"
@@ -71,13 +74,14 @@ class Store:
     Parameters
     ----------
     folder : Path
-        Created if it does not exist. A folder that contains other files than those of a sweep is an error.
+        Folder to use; it is created if it does not exist. If the folder contains files that do not belong to a sweep,
+        this gives an error.
 
     Raises
     ------
     InputError
-        The folder does not belong to a sweep or cannot be written; or, as `NotInstalledError`, pyarrow is not
-        installed.
+        The folder does not belong to a sweep or cannot be written to; or pyarrow is not installed
+        (`NotInstalledError`).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -100,7 +104,7 @@ class Store:
             stream.write(json.dumps({_MARK: 1, **about}, indent=2).encode() + b"\n")
 
     def _place(self, digest: str, suffix: str) -> Path:
-        """Return the path of a plan's file in one of 256 folders; folders with thousands of files are slow to write."""
+        """Return the path of a plan's file in one of 256 folders; writing to folders with many files is slow."""
         return self.folder / "plans" / digest[:2] / f"{digest}{suffix}"
 
     def write(self, digest: str, outcome: PlanOutcome) -> dict[str, Any]:
@@ -121,7 +125,7 @@ class Store:
         return facts
 
     def read(self, digest: str) -> dict[str, Any] | None:
-        """Return the columns of a finished plan; None if it is not stored completely."""
+        """Return the columns of a finished plan; None if the plan is not stored completely."""
         try:
             content = read_file(self._place(digest, ".parquet"))
             table = self._parquet.read_table(self._arrow.BufferReader(content))
@@ -144,7 +148,7 @@ class Store:
         Parameters
         ----------
         keys : sequence of str
-            The varied keys.
+            Keys of the task that were varied.
         rows : mapping of int to (mapping, mapping)
             Values of these keys, and columns of the outcome, by the number of the plan. Missing columns are null.
         name : str
@@ -185,7 +189,7 @@ class Store:
 
 
 def _column(values: Sequence[Any]) -> list[Any]:
-    """Return numbers, texts and truth values as they are, and other values, for example lists, as JSON."""
+    """Return numbers, texts and booleans as they are, and other values, for example lists, as JSON."""
     kinds = {type(value) for value in values if value is not None}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -201,7 +205,7 @@ class SweepResult(Summary):
     Attributes
     ----------
     folder : Path
-        Folder in which plans and table are stored.
+        Folder in which the plans and the table are stored.
     keys : tuple of str
         Task keys that were varied.
     table : pyarrow.Table
@@ -260,14 +264,14 @@ class SweepResult(Summary):
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Keys with more than one value."""
+        """Varied keys that have more than one value."""
         return tuple(
             key for key in self.keys if len(self.table.column(key).unique()) > 1
         )
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files of the table, as Parquet and as CSV."""
+        """Files that contain the table, as Parquet and as CSV."""
         return tuple(
             self.folder / f"{self.name}.{suffix}" for suffix in ("parquet", "csv")
         )
@@ -316,7 +320,7 @@ class SweepResult(Summary):
         return self.table.column("status").to_pylist().count(status)
 
     def failures(self) -> dict[str, tuple[int, str]]:
-        """Return how many plans failed with each class of error, with one message; the commonest error comes first."""
+        """Return the number of failed plans and one message for each class of error; the commonest comes first."""
         failed = [row for row in self.rows() if row["status"] == FAILED]
         counts = collections.Counter(row["error"] for row in failed)
         messages = {row["error"]: row["message"] for row in failed}
@@ -325,9 +329,9 @@ class SweepResult(Summary):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Summarise the sweep: numbers of plans; best, median and worst verified plan; failures by cause.
+        """Summarise the sweep: the numbers of plans; the best, median and worst verified plan; and failures by cause.
 
-        For an even number of plans, the median is the faster of the two in the middle.
+        For an even number of plans, the median is the faster of the two plans in the middle.
         """
         ranked = self.ranked()
         summary: dict[str, Any] = {"plans": len(self.table)}
@@ -354,7 +358,7 @@ class SweepResult(Summary):
         ----------
         keys : sequence of str, optional
             One or two of the varied keys. Default: the first two keys with more than one value. If plans also differ in
-            other keys, the fastest of them is shown.
+            other keys, the fastest of these plans is shown.
 
         Raises
         ------

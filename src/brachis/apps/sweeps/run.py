@@ -1,4 +1,4 @@
-"""Running a sweep: stored plans are kept, missing ones are made, and each is stored as soon as it is finished."""
+"""Running a sweep: stored plans are kept, missing plans are run, and each plan is stored as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -38,31 +38,33 @@ def sweep(
 ) -> SweepResult:
     """Plan a task many times with different values of its keys.
 
-    Every finished plan is stored at once. If a sweep was killed, run it again with the same folder, and it continues
-    where it stopped. A plan is recognised by its task with all defaults, the text of its URDF and the version of
-    brachis, not by its place in the sweep. If the sweep was changed in the meantime, plans that it still contains are
-    kept and new ones are made, and the table describes the current sweep.
+    Every finished plan is stored immediately. If a sweep was killed, run it again with the same folder; it then
+    continues where it stopped. A plan is recognised by its task with all defaults, the text of its URDF and the version
+    of brachis, not by its place in the sweep. If the sweep was changed in the meantime, plans that it still contains
+    are kept, new plans are run, and the table describes the current sweep.
 
     Parameters
     ----------
     source : path or mapping
         Sweep file, or its content as in `SweepSettings`.
     out : path, optional
-        Folder of the sweep. Default: a folder in the current one, named like the file without its suffix, or ``sweep``.
+        Folder of the sweep. Default: a subfolder of the current folder, named like the sweep file without its suffix,
+        or ``sweep``.
     jobs : int, optional
-        Number of processes on this machine. Maximum and default: its number of processors.
+        Number of processes on this machine. Maximum and default: the machine's number of processors.
     executor : Executor, optional
-        Makes the plans instead of processes on this machine: a Dask client or any ``concurrent.futures.Executor``, such
-        as those of mpi4py and parsl. Its workers need brachis, but no files.
+        Executor that runs the plans instead of processes on this machine: a Dask client or any
+        ``concurrent.futures.Executor``, such as those of mpi4py and parsl. The executor's workers need brachis, but no
+        files.
     part : str, optional
-        ``"i/n"`` plans only the i-th of n parts of the sweep, counted from 1. This is meant for jobs of a cluster's
+        ``"i/n"`` plans only the i-th of n parts of the sweep, counted from 1. Parts are meant for jobs of a cluster's
         scheduler that share the folder. Each part has its own table, such as ``table-2-of-8.csv``.
     merge : bool, optional
-        Whether to only collect the plans of all parts in one table. No plan is made.
+        Whether to only collect the plans of all parts in one table. No plan is run.
     retry : bool, optional
-        Whether stored failures are planned again.
+        Whether to run plans again that are stored as failed.
     listener : callable, optional
-        Called with a text on the progress of the sweep and the time left.
+        Function that is called with a text on the progress of the sweep and the time left.
     progress : bool, optional
         Whether to show the progress, as `plan` does.
 
@@ -74,11 +76,11 @@ def sweep(
     Raises
     ------
     TaskError
-        The sweep is not valid, or a key is an error in all plans that set it. Nothing was run.
+        The sweep is invalid, or a key causes an error in all plans that set it. No plan was run.
     InputError
         The folder does not belong to a sweep; a library is missing; or, with `merge`, plans are missing.
     ClusterError
-        The executor lost its workers, or they cannot run brachis. Finished plans are stored.
+        The executor lost its workers, or the workers cannot run brachis. Finished plans are stored.
 
     Examples
     --------
@@ -132,7 +134,7 @@ def sweep(
 
 
 def _read_part(text: str, plans: int) -> tuple[int, int]:
-    """Read ``i/n``, where n is at most the number of plans."""
+    """Read a part of the sweep, ``i/n``, where n is at most the number of plans."""
     numbers = re.fullmatch(r"([0-9]+)/([0-9]+)", text)
     first, part_count = map(int, numbers.groups()) if numbers else (0, 0)
     if not 1 <= first <= part_count <= plans:
@@ -146,7 +148,7 @@ def _read_part(text: str, plans: int) -> tuple[int, int]:
 
 
 def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
-    """Make no plan, and raise an error if any plan is missing."""
+    """Run no plan, and raise an error if any plan is missing."""
     digests = {plan.digest for plan in plans}
     numbers = [
         str(number)
@@ -157,7 +159,7 @@ def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
         raise InputError(
             "parts of the sweep are missing",
             where="merge",
-            found=f"no result of {write_count(len(numbers), 'plan')}: {name_first(numbers, ', ')}",
+            found=f"no result for {write_count(len(numbers), 'plan')}: {name_first(numbers, ', ')}",
             hint="Run the missing parts in the same folder, or run the sweep without merge",
         )
     yield from ()
@@ -166,7 +168,7 @@ def _refuse_missing(planned: SweepPlan, plans: Sequence[Plan]) -> Outcomes:
 def _run(
     selected: Sequence[Plan], store: Store, pool: Pool, *, retry: bool, tell: Listener
 ) -> dict[str, dict[str, Any]]:
-    """Make the plans that are not stored yet, and return the columns of all plans by digest."""
+    """Run the plans that are not stored yet, and return the columns of all plans by digest."""
     plans = {plan.digest: plan for plan in selected}
     facts_by_digest = {}
     for digest in plans:
@@ -195,6 +197,6 @@ def _run(
         interrupts.clear()
         counts = f"{len(facts_by_digest)} of {len(plans)} plans"
         raise KeyboardInterrupt(
-            f"{counts} are stored in {store.folder}; the same sweep continues from there"
+            f"{counts} are stored in {store.folder}; run the same sweep again to continue from there"
         ) from interrupt
     return facts_by_digest

@@ -1,4 +1,4 @@
-"""Content of a sweep file: a task, and the values that its keys take."""
+"""Content of a sweep file: a task, and the values of its keys."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ class _OneKey(Model):
 
 
 class Spacing(_OneKey):
-    """Values at equal distances or ratios."""
+    """Values with equal distances or equal ratios between them."""
 
     linear: tuple[Number, Number, _HowMany] | None = Field(
         default=None,
-        description="Equal distances: first value, last value, number of values.",
+        description="Values at equal distances: first value, last value, number of values.",
     )
     logarithmic: tuple[Positive, Positive, _HowMany] | None = Field(
         default=None,
-        description="Equal ratios: first value, last value, number of values.",
+        description="Values at equal ratios: first value, last value, number of values.",
     )
 
     def values(self) -> list[JsonValue]:
@@ -95,10 +95,10 @@ class Distribution(_OneKey):
         Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] | None
     ) = Field(
         default=None,
-        description="The logarithm is uniform between those of two ends > 0.",
+        description="The logarithm of the value is uniform between the logarithms of two ends > 0.",
     )
     normal: tuple[Number, Positive] | None = Field(
-        default=None, description="Mean and standard deviation."
+        default=None, description="Normal distribution: mean and standard deviation."
     )
     choice: _Values | None = Field(
         default=None, description="All listed values are equally likely."
@@ -124,8 +124,8 @@ class RandomSettings(Model):
     seed: Count = Field(
         default=0,
         ge=0,
-        description="Seed. Every key has its own random stream, so that more draws or further keys do not change the "
-        "first draws.",
+        description="Seed of the random values. Every key has its own random stream, so that more draws or further "
+        "keys do not change the first draws.",
     )
     keys: Annotated[dict[Name, Distribution], Field(min_length=1)] = Field(
         description="The distribution of every key: uniform: [low, high], log_uniform: [low, high], normal: [mean, "
@@ -207,14 +207,14 @@ class SweepSettings(Model):
         return tuple(itertools.chain(*self._varied.values()))
 
     def changes(self) -> list[dict[str, JsonValue]]:
-        """List the varied keys and their values for every plan. The grid's first key changes slowest.
+        """List the varied keys and their values for every plan. The first key of the grid changes slowest.
 
-        Equal plans occur only once.
+        Equal plans are listed only once.
 
         Raises
         ------
         TaskError
-            There are more than `MOST_PLANS`.
+            There are more than `MOST_PLANS` plans.
         """
         columns = [
             values.values() if isinstance(values, Spacing) else values
@@ -247,5 +247,5 @@ class SweepSettings(Model):
 
 
 def _alike(changes: dict[str, JsonValue]) -> str:
-    """Return a text that is equal for equal changes, no matter whether a number is written as 90 or 90.0."""
+    """Return a text that is equal for equal changes, whether a number is written as 90 or 90.0."""
     return json.dumps(json.loads(json.dumps(changes), parse_int=float), sort_keys=True)

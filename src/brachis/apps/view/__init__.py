@@ -1,6 +1,6 @@
 """The viewer: robot, path, tool trace and ghost postures in the browser, with plots that follow a slider.
 
-The browser talks to a server on this machine (viser, from the extra ``view``), which plays the motion.
+The browser is connected to a server on this machine (viser, from the extra ``view``), which plays the motion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Shapes of a robot and its scene for drawing: those of the URDF or a skeleton, and their placements.
+"""Shapes for drawing a robot and its scene: those of the URDF or a skeleton, and their placements.
 
 Every shape belongs to the joint that moves it. Joint 0 is the world, which stands still.
 """
@@ -34,15 +34,15 @@ if TYPE_CHECKING:
     Meshes = dict[int, list[trimesh.Trimesh]]
 
 _COLOURS = {
-    "shape": (150, 160, 172, 255),  # for a shape without its own colour
+    "shape": (150, 160, 172, 255),  # colour of a shape without a colour of its own
     "bone": (72, 101, 129, 255),
     "joint": (230, 159, 0, 255),
     "axis": (120, 130, 140, 255),
     "scene": (190, 120, 90, 255),
 }
-"""Colours as RGBA from 0 to 255."""
+"""Colours of shapes as RGBA from 0 to 255."""
 _LARGEST = 200_000_000
-"""Largest total size of a robot's unpacked mesh files, bytes. Reading them takes several times as much memory."""
+"""Maximum total size of a robot's unpacked mesh files, bytes. Reading them takes several times as much memory."""
 
 _FLOOR = 4.0
 """Length and width of the plate that represents a half-space, m."""
@@ -60,14 +60,15 @@ def link_shapes(
     urdf : str
         Text of the URDF.
     folder : Path
-        Folder of the URDF. Names of mesh files are relative to it, and packages are searched in the folders above it.
+        Folder of the URDF. Names of mesh files are relative to this folder, and packages are searched for in the
+        folders above it.
 
     Returns
     -------
     shapes : dict of str to list of Trimesh
         Shapes by link, in the link's frame, m.
     unread : list of str
-        Link and reason for each shape that cannot be shown. Missing files share one entry.
+        Link and reason for each shape that cannot be shown. All missing files share one entry.
     """
     tree = read_tree(urdf, "URDF")
     shapes: dict[str, list[trimesh.Trimesh]] = {}
@@ -91,7 +92,7 @@ def link_shapes(
             shapes.setdefault(name, []).extend(meshes)
         except InputError as error:
             unread.append(f"{name}: {error}")
-        except Exception as error:  # noqa: BLE001  (a file may be anything, and so may what its reader raises)
+        except Exception as error:  # noqa: BLE001  (a file may contain anything, and its reader may raise any error)
             unread.append(f"{name}: {type(error).__name__}: {error}")
     if absent:
         hint = "ROS_PACKAGE_PATH can name the folder of a package"
@@ -106,7 +107,7 @@ def _check_size(path: Path, room: int) -> int:
     Raises
     ------
     InputError
-        The file is compressed, so that its size is unknown, or it is larger than `room`, bytes.
+        The file is compressed, so that its size is unknown, or it is larger than `room` bytes.
     """
     if path.suffix in {".gz", ".bz2"}:
         raise InputError(
@@ -131,7 +132,7 @@ def _check_size(path: Path, room: int) -> int:
 def _meshes(
     name: str, visual: Element, materials: list[Element]
 ) -> list[trimesh.Trimesh]:
-    """Read one visual with yourdfpy, as the only visual of a robot with one link.
+    """Read one visual with yourdfpy, as the only visual of a robot with a single link.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def _meshes(
 
 def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Colour a mesh unless it has a texture."""
-    # The look is a material, or the colours of the faces.
+    # The appearance of a mesh is a material, or the colours of its faces.
     look = getattr(mesh.visual, "material", mesh.visual)
     pictures = [getattr(look, name, None) for name in ("baseColorTexture", "image")]
     if pictures != [None, None]:
@@ -175,7 +176,7 @@ def _paint(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def with_colour(mesh: trimesh.Trimesh, colour: tuple[int, ...]) -> trimesh.Trimesh:
-    """Give a mesh a matt material with an RGBA colour, 0 to 255, and sharp edges if it has few faces."""
+    """Give a mesh a matt material with an RGBA colour, 0 to 255, and sharp edges if the mesh has few faces."""
     import trimesh
 
     if len(mesh.faces) <= 2000:
@@ -195,7 +196,7 @@ def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     positions : (K, n + 2, 3) ndarray
         Positions of the world, of the frame that each joint moves, and of the tool, in the world frame, m.
     quaternions : (K, n + 2, 4) ndarray
-        Their orientations: w, x, y, z.
+        Orientations of these frames: w, x, y, z.
     """
     tool = robot.frame_id
     rows = [
@@ -215,13 +216,13 @@ class Bodies:
     links : dict of int to list of Trimesh
         Visual shapes of the URDF and bodies of the scene; joint 0 is the world.
     skeleton : dict of int to list of Trimesh
-        Joints and the straight lines between them.
+        Shapes for the joints and for the straight lines between them.
     unread : tuple of str
         Shapes of the URDF that cannot be shown, with reasons.
     box : (2, 3) ndarray
-        Lower and upper corner of a box that contains the whole robot at all times, m.
+        Lower and upper corners of a box that contains the whole robot at all times, m.
     moving_box : (2, 3) ndarray
-        The same for a box that contains only the joints, the bodies they move, and the tool, m.
+        Lower and upper corners of a box that contains only the joints, the bodies they move, and the tool, m.
     """
 
     links: Meshes
@@ -232,7 +233,7 @@ class Bodies:
 
     @property
     def shows_links(self) -> bool:
-        """Whether all links can be shown; otherwise the skeleton is shown."""
+        """Whether all links can be shown; if not, the skeleton is shown."""
         return bool(self.links) and not self.unread
 
 
@@ -308,7 +309,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
-    """Return the path at the motion's own s, (K, 3), m. Coordinates that it does not prescribe are the tool's."""
+    """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are those of the tool."""
     task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
     axes = list(task_map.axes)
     points = samples.tool_position.copy()
@@ -320,7 +321,7 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
 
 
 def scene_meshes(trajectory: Trajectory) -> Meshes:
-    """Make meshes of the bodies in a task's scene, without the robot's own, in the frames of their joints, m."""
+    """Make meshes of the bodies in a task's scene, without those of the robot, in the frames of their joints, m."""
     task = trajectory.task
     scene = scene_of(trajectory.robot, task)
     meshes: Meshes = defaultdict(list)

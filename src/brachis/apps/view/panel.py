@@ -1,4 +1,4 @@
-"""The viewer's playback clock, and its plots with a line at the instant shown."""
+"""The viewer's playback clock, and its plots, in which a line marks the instant shown."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 _PIXELS = {
     "height": 165,  # of a plot
-    "left": 40,  # margin between the plot's edge and its curves, as in the next three rows
+    "left": 40,  # margin between the edge of a plot and its curves, as in the next three rows
     "right": 12,
     "above": 6,
     "below": 44,
-    "label": 16,  # label of the axis, which is part of the margin below
+    "label": 16,  # label of the axis, which is included in the bottom margin
     "outside left": 9.5,  # space that viser leaves around a plot; a test measures it
     "outside": 18.5,  # sum of both sides
     "outside below": 12,
@@ -39,7 +39,7 @@ _FONT = "11px sans-serif"
 def shown_panels(
     trajectory: Trajectory, samples: Samples, *, degrees: bool = False
 ) -> list[Panel]:
-    """Make the viewer's panels: ratios to all limits, joint quantities without a limit, and the tool's speed.
+    """Make the panels of the viewer: ratios to all limits, joint quantities without a limit, and the tool's speed.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def shown_panels(
 
 
 def add_plot(gui: viser.GuiApi, panel: Panel) -> viser.GuiHtmlHandle:
-    """Add one plot over time, and return the HTML element that shows the line at the current instant."""
+    """Add one plot over time, and return the HTML element that shows a line at the current instant."""
     data = [panel.t]
     series: list[uplot.Series] = [{"label": "time (s)"}]
     for limit, _ in panel.near_limits():
@@ -105,7 +105,7 @@ def _series(
 
 
 def line_at(fraction: float) -> str:
-    """Return a line over the plot above it, at a fraction of its width; redrawing the plot would make it blink."""
+    """Return an HTML line over a plot, at a fraction of its width; redrawing the plot would make it blink."""
     before = _PIXELS["outside left"] + _PIXELS["left"]
     around = _PIXELS["outside"] + _PIXELS["left"] + _PIXELS["right"]
     offset = f"calc({before}px + {fraction:.5f} * (100% - {around}px))"
@@ -149,25 +149,25 @@ RATES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 def first_rate(t_end: float) -> float:
-    """Return the largest of `RATES` up to real time at which a motion of `t_end` s takes at least 3 s."""
+    """Return the fastest of `RATES`, up to real time, at which a motion of `t_end` s takes at least 3 s."""
     slow = [rate for rate in RATES if rate <= 1.0 and t_end / rate >= 3.0]
     return max(slow, default=RATES[0])
 
 
 @dataclass
 class Playback:
-    """Playback of a motion.
+    """State of the playback of a motion.
 
     Attributes
     ----------
     t_end : float
-        End of the motion, s.
+        End time of the motion, s.
     rate : float
         Playback speed, as a fraction of real time.
     loops : bool
-        Whether the motion starts again without a pause, because it is periodic.
+        Whether the motion is periodic and therefore starts again without a pause.
     repeats : bool
-        Whether the playback starts again at the end of the motion; otherwise it stops there.
+        Whether the playback starts again at the end of the motion; if not, it stops there.
     playing : bool
     time : float
         Instant that is shown, s.

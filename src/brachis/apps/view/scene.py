@@ -29,7 +29,7 @@ class ViewerScene:
     Attributes
     ----------
     samples : Samples
-        The motion at equidistant times.
+        Samples of the motion at equidistant times.
     bodies : Bodies
     layers : dict of str to list of handles
         Parts of the scene that can be shown and hidden, by name.
@@ -44,7 +44,7 @@ class ViewerScene:
         self.samples = trajectory.at(np.linspace(0.0, trajectory.t_end, 401))
         self.bodies = bodies_of(trajectory)
         self._size = float(np.linalg.norm(np.ptp(self.bodies.moving_box, axis=0)))
-        # Pale robots are easier to see on the white page with a plain light.
+        # With a plain light, pale robots are easier to see on the white page.
         self._api.configure_environment_map(None)
         self._api.add_light_hemisphere(
             "/light",
@@ -83,7 +83,7 @@ class ViewerScene:
             handle.visible = visible
 
     def show(self, q: np.ndarray) -> None:
-        """Move the robot into the posture `q`, (n,)."""
+        """Show the robot in the posture `q`, (n,)."""
         positions, quaternions = placements(self._robot, q[None])
         for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
@@ -92,7 +92,7 @@ class ViewerScene:
             self._show_closest(self._cell, q)
 
     def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
-        """Draw the line between the closest bodies in a posture, (n,), and write their distance."""
+        """Draw a line between the closest bodies in a posture, (n,), and write their distance."""
         line, label = self.layers["closest pair"]
         if not line.visible:
             return
@@ -103,7 +103,7 @@ class ViewerScene:
         label.text = f"{cell.names(closest.pair[0])}: {distance:.1f} mm"
 
     def _frame(self, name: str, fraction: float) -> viser.FrameHandle:
-        """Add axes whose length is a fraction of the scene's size."""
+        """Add the axes of a frame, whose length is a fraction of the scene's size."""
         length = fraction * self._size
         return self._api.add_frame(
             name,
@@ -113,7 +113,7 @@ class ViewerScene:
         )
 
     def _draw_bodies(self) -> None:
-        """Attach links and skeleton to the frames of the joints, with one asset per joint and layer."""
+        """Attach the links and the skeleton to the frames of the joints, with one asset per joint and layer."""
         import trimesh
 
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
@@ -166,7 +166,7 @@ class ViewerScene:
             self.layers["path"].append(ball)
 
     def _draw_trace(self) -> None:
-        """Draw the tool's path in 32 colours of its speed; viser would show colours of single points too light."""
+        """Draw the tool's path in 32 colours by its speed; viser would show the colours of single points too light."""
         speed = self.samples.tool_speed
         fractions = 0.5 * (speed[:-1] + speed[1:]) / max(speed.max(), 1e-9)
         shades = np.round(31.0 * fractions).astype(int)
@@ -214,10 +214,10 @@ class ViewerScene:
         self.layers["ground"].append(grid)
 
     def _aim(self, server: viser.ViserServer) -> None:
-        """Aim the camera: at the plane of a planar motion, otherwise from the side to which the arm reaches."""
+        """Aim the camera: at the plane of a planar motion, or else from the side to which the arm reaches."""
         camera = server.initial_camera
         camera.fov = 0.75  # rad
-        # 1.35 times the distance from which the motion fills the height of the picture.
+        # The camera is at 1.35 times the distance from which the motion fills the height of the picture.
         distance = 1.35 * 0.5 * self._size / np.sin(0.5 * camera.fov)
         camera.near = 0.005 * distance
         camera.far = 100.0 * distance

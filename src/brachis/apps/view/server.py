@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT = 8080
-"""Port that is tried first if the user gives none."""
+"""Port that is tried first if the user gives no port."""
 
 
 def start_server(host: str, port: int | None) -> viser.ViserServer:
-    """Start the server.
+    """Start the viewer's server.
 
     Parameters
     ----------
     host : str
-        Address or name on which it listens.
+        Address or name of the host on which the server listens.
     port : int or None
-        0 chooses any free port. None chooses the first free port from `FIRST_PORT` on.
+        Port of the server. 0 chooses any free port; None chooses the first free port from `FIRST_PORT` on.
 
     Raises
     ------
@@ -44,17 +44,17 @@ def start_server(host: str, port: int | None) -> viser.ViserServer:
         """A silent server whose scene stays on this machine. With viser's own server, a page can publish the scene."""
 
         def request_share_url(self, verbose: bool = True) -> None:  # noqa: FBT002  (viser's signature)
-            """Do nothing, so that the scene gets no public address."""
+            """Do nothing, so that the scene does not get a public address."""
 
         def stop(self) -> None:
-            """Stop silently, because standard output is for results."""
+            """Stop the server silently, because standard output is for results."""
             with contextlib.redirect_stdout(io.StringIO()):
                 super().stop()
 
     _check(host, port or 0)
-    # Refuse probes, such as HEAD requests, without a message.
+    # Reject probes, such as HEAD requests, without a message.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    first = FIRST_PORT if port is None else port  # viser chooses the next free one
+    first = FIRST_PORT if port is None else port  # viser chooses the next free port
     with contextlib.redirect_stdout(io.StringIO()):
         return Server(host=host, port=first, label="brachis", verbose=False)
 
@@ -71,7 +71,7 @@ def require_viser() -> None:
 
 
 def is_local(host: str) -> bool:
-    """Return whether only this machine can reach an address that the server listens on."""
+    """Return whether only this machine can reach an address on which the server listens."""
     addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     return all(ipaddress.ip_address(address[4][0]).is_loopback for address in addresses)
 

@@ -1,4 +1,4 @@
-"""Tables of the viewer's panel as HTML. Names come from files, so they are escaped."""
+"""Tables of the viewer's panel as HTML. Names are escaped, because they come from files."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
 _CELL = "padding:0 0.35em;white-space:nowrap"
 _WRAPPED = "padding:0 0.35em 0.2em 0;vertical-align:top;overflow-wrap:anywhere"
 _STATE = {"position": 3, "velocity": 3, "torque": 2}
-"""Joint quantities that are shown, and their numbers of decimals."""
+"""Joint quantities that are shown, each with its number of decimals."""
 
 
 def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) -> str:
-    """Show the time, the path coordinate, the tool, and the state of every joint at one instant.
+    """Return a table of the time, the path coordinate, the tool, and the state of every joint at one instant.
 
     Parameters
     ----------
     trajectory : Trajectory
     now : Samples
-        Samples at one time.
+        Sample of the trajectory at a single time.
     degrees : bool, optional
-        Whether angles are in degrees.
+        Whether to show angles in degrees.
     """
     place = ", ".join(f"{value:.4f}" for value in now.tool_position[0])
     lines = [
@@ -53,13 +53,13 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
 
 
 def phases_table(trajectory: Trajectory) -> str:
-    """List the phases of the motion. The text is empty for a single phase."""
+    """Return a table of the phases of the motion; for a single phase, it is empty."""
     rows = phase_rows(trajectory.phases)
     return _table(PHASE_COLUMNS, rows) if len(rows) > 1 else ""
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
-    """List the candidates of a search, as `Candidate.to_dict` gives them, beginning with the fastest verified one."""
+    """Return a table of a search's candidates, given as by `Candidate.to_dict`, with the fastest verified one first."""
     if not candidates:
         return _paragraph(
             "The candidates of the search are unknown here; see result.json in the folder of result.npz."
@@ -71,12 +71,12 @@ def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:
 
 
 def paragraphs(lines: Sequence[str]) -> str:
-    """Write each sentence as a paragraph."""
+    """Return each sentence as a paragraph."""
     return "".join(_paragraph(line) for line in lines)
 
 
 def speed_legend(stops: Sequence[str], fastest: float) -> str:
-    """Draw a colour bar of the tool's speed from 0 to `fastest`, m/s. `stops` are CSS colours."""
+    """Return a colour bar for the tool's speed from 0 to `fastest`, m/s. `stops` are CSS colours."""
     marks = "".join(
         f"<span>{fraction * fastest:.3g}</span>"
         for fraction in (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -91,7 +91,7 @@ def speed_legend(stops: Sequence[str], fastest: float) -> str:
 def summary(
     trajectory: Trajectory, notes: Sequence[str], *, verified: bool | None
 ) -> str:
-    """Show the end time, the outcome of the verification if known, and notes for the user."""
+    """Return the end time, the outcome of the verification if it is known, and notes for the user."""
     verdict = {
         None: "",
         True: ", verified",

@@ -41,13 +41,13 @@ class Viewer(AbstractContextManager["Viewer"]):
     ----------
     trajectory : Trajectory
     candidates : sequence of mapping, optional
-        Candidates of the search, as `Candidate.to_dict` gives them.
+        Candidates of the search, as returned by `Candidate.to_dict`.
     verified : bool, optional
         Whether the motion passed the verification, if known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address on which the server listens. By default only this machine can reach it.
+        Address on which the server listens. By default, only this machine can reach the server.
     port : int, optional
         0 chooses any free port. Default: the first free port from 8080 on.
 
@@ -58,7 +58,7 @@ class Viewer(AbstractContextManager["Viewer"]):
     local : bool
         Whether only this machine can reach the page.
     playback : Playback
-        The playback, with the instant that is shown.
+        State of the playback, with the instant that is shown.
 
     Raises
     ------
@@ -106,13 +106,13 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._thread.start()
 
     def show(self) -> None:
-        """Show the current instant of the playback."""
+        """Show the motion at the current instant of the playback."""
         with self._lock, self._server.atomic():
             self._scene.show(self._trajectory.position(self.playback.time))
             self._update()
 
     def wait(self) -> None:
-        """Wait until Ctrl-C is pressed, then stop."""
+        """Wait until Ctrl-C is pressed, then stop the server."""
         with interrupts.end_on_interrupt():
             while not self._stopped.wait(0.5):
                 interrupts.check()
@@ -138,7 +138,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         return f'<iframe src="{url}" width="100%" height="640" style="border:0"></iframe><a href="{url}">{url}</a>'
 
     def _run(self) -> None:
-        """Play the motion while a page is open, with 30 pictures/s of the robot and 10 of the plots and the table."""
+        """Play the motion while a page is open, with 30 updates/s of the robot and 10 of the plots and the table."""
         before = time.monotonic()
         picture = 0
         while not self._stopped.wait(1.0 / 30.0):
@@ -186,7 +186,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             holder.content = line
 
     def _follow(self) -> None:
-        """Let the slider and the button follow the playback."""
+        """Make the slider and the button follow the playback."""
         self._slider.value = round(self.playback.time, 3)
         self._button.label = "Pause" if self.playback.playing else "Play"
 
@@ -212,7 +212,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         download.on_click(self._send_report)
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-        """Show the instant chosen with the slider, and pause there."""
+        """Show the instant chosen with the slider, and pause the playback there."""
         if event.client is not None:  # otherwise the slider follows the playback
             self.playback.go_to(event.target.value)
             self.show()
@@ -289,29 +289,29 @@ def view(
 ) -> Viewer:
     """Show a motion in the browser: robot, path, ghost postures, and plots that follow a slider.
 
-    Needs the extra ``view``.
+    The viewer needs the extra ``view``.
 
     Parameters
     ----------
     motion : Trajectory or path
         The motion, or its result file.
     candidates : sequence of mapping, optional
-        Candidates of the search, as `Result.to_dict` lists them.
+        Candidates of the search, as listed by `Result.to_dict`.
     verified : bool, optional
         Whether the motion passed the verification, if known.
     degrees : bool, optional
         Whether angles are shown in degrees.
     host : str, optional
-        Address on which the viewer listens. By default only this machine can reach it.
+        Address on which the viewer listens. By default, only this machine can reach the viewer.
     port : int, optional
         0 chooses any free port. Default: the first free port from 8080 on.
     block : bool, optional
-        Whether to wait until Ctrl-C is pressed. By default a script waits; interactive sessions and notebooks do not.
+        Whether to wait until Ctrl-C is pressed. By default, a script waits; interactive sessions and notebooks do not.
 
     Returns
     -------
     brachis.apps.view.Viewer
-        The viewer, with its ``url``. Its method ``stop()`` ends it.
+        The viewer, with its address ``url``. The method ``stop()`` ends the viewer.
 
     Raises
     ------

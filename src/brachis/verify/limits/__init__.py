@@ -1,6 +1,6 @@
-"""Ratios to limits, computed by the verification's own formulas, which share no code with `brachis.limits`.
+"""Ratios to limits, computed with the verification's own formulas, which share no code with `brachis.limits`.
 
-Only a user's own limit without a check is verified with its own values, and its check says so.
+Only a user's own limit that has no method `check` is verified with its own values, and the result of its check says so.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ LIMIT_CHECKS: dict[str, LimitCheck] = {
     **MARGIN_CHECKS,
     "clearance": worst_clearance,
 }
-"""Check of each kind of limit, in the order of the verification."""
+"""The check of each kind of limit, in the order in which the verification runs them."""
 
 
 def check_limits(
     motion: CheckedMotion, own_limits: Sequence[LimitModel]
 ) -> list[Check]:
-    """Check all kinds of limits, then those of the task's ``custom_limits`` and the user's own."""
+    """Check all kinds of limits, then the limits of the task's ``custom_limits`` and the user's own limits."""
     results = [
         (kind.replace("_", " "), find(motion)) for kind, find in LIMIT_CHECKS.items()
     ]
@@ -64,16 +64,16 @@ def check_limits(
 def _check_model(
     where: str, model: LimitModel, motion: CheckedMotion
 ) -> tuple[str, Worst]:
-    """Find the worst ratio to one of the user's own limits, and the name of the limit.
+    """Find the worst ratio to one of the user's own limits, and return it with the name of the limit.
 
     A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), computed by a different
-    formula. Without it, the limit's own values are checked densely.
+    formula. Without this method, the limit's own values are checked densely.
     """
     limit = bind_model(where, model, motion.robot)
     subjects = [label.subject for label in limit.labels]
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes of the ratios, (K, c)."""
+        """Return the magnitudes of the ratios, (K, c)."""
         if not has_check(model):
             return np.abs(limit.ratios(states, states.t))
         arguments = (states.q, states.qdot, states.qddot, states.tau)

@@ -1,8 +1,8 @@
-"""The smallest distance between solids on the whole motion, by branch and bound over time.
+"""The smallest distance between solids during the whole motion, found by branch and bound over time.
 
-Between two instants, a distance cannot shrink faster than the joints between both solids move one towards the other.
-Let d_0 and d_1 be the distances at the ends of a step, let joint i turn by D_i within it, and let points be at most r_i
-from its axis. Then
+Between two instants, the distance between two solids cannot shrink faster than the joints between them can bring them
+together. Let d_0 and d_1 be the distances at the ends of a step. Let joint i turn by D_i within the step, and let the
+points that it moves be at most r_i from its axis. Then
 
     d >= (d_0 + d_1 - sum_i r_i D_i) / 2        at all instants of the step.
 
@@ -19,13 +19,13 @@ from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
 
 _LOOK = 0.05
-"""Distances are computed up to this much above the clearance, m."""
+"""Margin above the clearance up to which distances are computed, m."""
 _ROUNDING = 1e-5
-"""Largest gap between found and proven distance if the distance is close to the clearance, m."""
+"""Allowed gap between the distance found and the proven bound if the distance is close to the clearance, m."""
 _FINE = 1e-3
-"""Largest gap if the distance is well above the clearance, m."""
+"""Allowed gap between them if the distance is well above the clearance, m."""
 _MOST = 300_000
-"""Largest number of steps that are halved."""
+"""Maximum number of steps that are halved."""
 _STATES = 2_000
 """Number of states that are evaluated at once."""
 
@@ -63,11 +63,11 @@ class _Search:
     Attributes
     ----------
     least, time, pair : float, float, int
-        Smallest distance found, m, with its time, s, and pair.
+        Smallest distance found, m, with the time, s, and the pair at which it occurs.
     distances : (P,) ndarray
         Smallest distance of each pair at the instants that were checked, m.
     proven : float
-        No distance is smaller than this and `least`, apart from the allowed gaps, m.
+        Proven bound, m: apart from the allowed gaps, no distance is smaller than both this bound and `least`.
     """
 
     def __init__(self, motion: CheckedMotion, scene: Scene, clearance: float) -> None:
@@ -92,7 +92,7 @@ class _Search:
             self._search(states.only(slice(first, first + _STATES + 1)))
 
     def _search(self, states: MotionStates) -> None:
-        """Search at the states and between them."""
+        """Search at the given states and between them."""
         placed = joint_placements(self._motion.robot, states.q)
         far = self._clearance + _LOOK
         distance = np.maximum(self._scene.bounds(placed), far)
@@ -148,12 +148,12 @@ class _Search:
 
     @property
     def _goal(self) -> float:
-        """Distance that has to be proven for a step, m."""
+        """Lower bound on the distance that must be proven for a step, m."""
         near = min(self.least, self._clearance) - _ROUNDING
         return max(near, self.least - _FINE)
 
     def _record(self, distance: np.ndarray, t: np.ndarray, pair: np.ndarray) -> None:
-        """Store the smallest distance of all pairs and of each pair."""
+        """Store the smallest distance over all pairs, and the smallest distance of each pair."""
         np.minimum.at(self.distances, pair, distance)
         if distance.min(initial=np.inf) < self.least:
             best = np.argmin(distance)
@@ -163,9 +163,9 @@ class _Search:
 
 
 def _reaches(motion: CheckedMotion, scene: Scene) -> np.ndarray:
-    """Return how far points of pairs can be from the axes of the joints between them, (n, P), m.
+    """Return the largest distances, (n, P), m, of points of pairs of solids from the axes of the joints between them.
 
-    The value is 1 for a prismatic joint, and 0 for a joint that moves both solids of a pair or neither.
+    The value is 1 for a prismatic joint, and 0 for a joint that moves both solids of a pair or neither of them.
     """
     bodies = motion.robot.urdf_dynamics.bodies
     farthest = np.abs(motion.pieces.nodes + motion.pieces.position).max(axis=(0, 1))

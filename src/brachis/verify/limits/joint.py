@@ -1,4 +1,4 @@
-"""Ratios of the joints' motion to their limits.
+"""Ratios of the motion of the joints to their limits.
 
 Positions and their derivatives are polynomials, so their ratios are exact. Torques and quantities derived from them are
 checked densely.
@@ -38,9 +38,9 @@ def _worst_derivative(kind: str, motion: CheckedMotion) -> Worst | None:
 def _worst_position(motion: CheckedMotion) -> Worst | None:
     """Find the position that is closest to an end of its range, or furthest beyond it, at any time.
 
-    Inside the range, the ratio is the place in it: 0 in the middle and 1 at the ends. For a range with only one end, it
-    is 1 minus the distance from this end, rad or m, and 0 farther away. Beyond an end, the ratio is 1 plus the excess
-    divided by half the range; the divisor is at least 1e-5 and at most 1 rad or m.
+    Inside the range, the ratio is 0 in the middle and 1 at the ends. For a range with only one end, the ratio is 1
+    minus the distance from this end, rad or m, but at least 0. Beyond an end, the ratio is 1 plus the excess divided by
+    half the range; the divisor is at least 1e-5 and at most 1 rad or m.
     """
     lower, upper = motion.robot.limits.both_ways("position")
     if np.isinf(lower).all() and np.isinf(upper).all():
@@ -109,7 +109,7 @@ def _worst_total_power(motion: CheckedMotion) -> Worst | None:
     """Find the largest ratio of the sum of all joints' powers."""
 
     def powers(states: MotionStates) -> np.ndarray:
-        """Return the sizes of the total power, (K,)."""
+        """Return the magnitudes of the total power, (K,)."""
         return np.abs(np.einsum("ki,ki->k", states.tau, states.qdot))
 
     return worst_size(motion, motion.robot.limits.total_power, powers, "all joints")
@@ -118,7 +118,8 @@ def _worst_total_power(motion: CheckedMotion) -> Worst | None:
 def _worst_torque_at_speed(motion: CheckedMotion) -> Worst | None:
     """Find the torque that is closest to, or furthest beyond, its joint's torque-speed curve.
 
-    The ratio is 1 on the curve. Differences from it are fractions of the torque at rest.
+    The ratio is 1 on the curve. Off the curve, the ratio differs from 1 by the distance in torque, as a fraction of the
+    torque at rest.
     """
     robot = motion.robot
     curves = robot.limits.torque_speed
@@ -159,9 +160,9 @@ JOINT_CHECKS: dict[str, LimitCheck] = {
         ),
     ),
 }
-"""The check of every row of `LIMIT_KINDS`."""
+"""The check for every row of `LIMIT_KINDS`."""
 DRIVE_CHECKS: dict[str, LimitCheck] = {
     "total_power": _worst_total_power,
     "torque_speed": _worst_torque_at_speed,
 }
-"""The checks of `brachis.limits.drives`: limits of drives and of the whole robot."""
+"""The checks for the limits in `brachis.limits.drives`: limits of drives and of the whole robot."""

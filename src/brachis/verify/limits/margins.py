@@ -1,7 +1,7 @@
-"""Margins of a motion from singular postures and from the ends of joint ranges, computed with the URDF's own chain.
+"""Distances of a motion from singular postures and from the ends of joint ranges, computed with the URDF's chain.
 
-Let p be the point that follows the path, and let a joint have an axis z through the point o. Its column of the Jacobian
-is z x (p - o) and z for a revolute joint, and z and 0 for a prismatic one.
+Let p be the point that follows the path, and let a joint have an axis z through the point o. For a revolute joint, its
+column of the Jacobian consists of z x (p - o) and z; for a prismatic joint, of z and 0.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ def find_margins(motion: CheckedMotion, states: MotionStates) -> tuple[Margin, .
 
 
 def _singular_values(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
-    """Return least singular values, (K,), of the Jacobian of the prescribed rows with respect to the arm's joints.
+    """Return smallest singular values, (K,), of the Jacobian of the prescribed rows with respect to the arm's joints.
 
-    They are the square roots of the least eigenvalues of J J^T, and accurate to 1e-8 of the largest one.
+    The singular values are the square roots of the smallest eigenvalues of J J^T, accurate to within 1e-8 of the
+    largest singular value.
     """
     rotations, origins = states.joints
     tool = tool_placements(motion.robot, states.q, states.joints)[0].T
@@ -58,7 +59,7 @@ def _singular_values(motion: CheckedMotion, states: MotionStates) -> np.ndarray:
 def _parts_of_ranges(
     motion: CheckedMotion, states: MotionStates
 ) -> tuple[np.ndarray, list[str]]:
-    """Return distances from the middle of joint ranges, (K, c), which are 1 at the ends, and the joints' names."""
+    """Return distances from the middle of joint ranges, (K, c), scaled to 1 at the ends, and the joints' names."""
     count = len(motion.robot.urdf_joints)
     ends = motion.robot.limits.both_ways("position")[:, :count]
     joints = np.flatnonzero(np.isfinite(ends).all(axis=0))
@@ -69,13 +70,13 @@ def _parts_of_ranges(
 
 
 def _worst_singularity(motion: CheckedMotion) -> Worst | None:
-    """Find the largest of 2 - value / margin, which is 1 at the margin and 2 in a singular posture."""
+    """Find the largest 2 - value / margin, which is 1 where the margin is just kept and 2 in a singular posture."""
     margin = motion.task.margins.singularity
     if margin is None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return 2 - value / margin, (K, 1)."""
+        """Return 2 - value / margin for the smallest singular values, (K, 1)."""
         return 2.0 - _singular_values(motion, states)[:, None] / margin
 
     return worst_between(motion, ratios, ("arm",))
@@ -89,7 +90,7 @@ def _worst_joint_end(motion: CheckedMotion) -> Worst | None:
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the distances from the middles divided by the allowed ones, (K, c)."""
+        """Return the distances from the middles of the ranges divided by the allowed distances, (K, c)."""
         return _parts_of_ranges(motion, states)[0] / (1.0 - 2.0 * share)
 
     return worst_between(motion, ratios, names)

@@ -10,7 +10,7 @@ import numpy as np
 from brachis.verify.motion import CheckedMotion, MotionStates, turns
 
 _AT_ONCE = 5000
-"""Number of steps that are handled together, so that they stay in the processor's cache."""
+"""Number of steps that are processed together, so that their data stay in the processor's cache."""
 
 
 class Worst(NamedTuple):
@@ -22,7 +22,7 @@ class Worst(NamedTuple):
     subject : str
         Joint, tool, or other subject that has this ratio.
     time : float
-        Time at which it occurs, s.
+        Time at which this ratio occurs, s.
     remark : str
         Note on the check; often empty.
     is_kept : bool
@@ -46,7 +46,7 @@ def worst_between(
     subjects: Sequence[str],
     states: MotionStates | None = None,
 ) -> Worst:
-    """Find the largest of several ratios that are not polynomials, at the states and between them.
+    """Find the largest of several ratios that are not polynomials, at the given states and between them.
 
     Steps between states are halved as long as the largest ratio may lie within one of them. Over a step of length h, a
     ratio with curvature c rises above its higher end by at most (c h - |slope|)^2 / 4 c, if it peaks within the step at
@@ -58,14 +58,15 @@ def worst_between(
     ratio_at : callable
         ``ratio_at(states)`` returns the ratios, (K, c).
     subjects : sequence of str
-        Subjects of the c ratios.
+        Names of the subjects of the c ratios.
     states : MotionStates, optional
-        Initial states. Default: those of the whole motion.
+        Initial states. Default: the states of the whole motion.
 
     Returns
     -------
     Worst
-        If 100,000 more states are not enough, this is an upper bound of the ratio, with a remark.
+        The largest ratio. If 100,000 more states are not enough to find this ratio, `ratio` is an upper bound, with a
+        remark.
     """
     states = motion.states if states is None else states
     most_states = len(states.t) + 100_000
@@ -94,12 +95,12 @@ def worst_size(
     sizes: Callable[[MotionStates], np.ndarray],
     subject: str = "tool",
 ) -> Worst | None:
-    """Find the largest ratio of a size, (K,), to its allowed value; None if the size is not limited."""
+    """Find the largest ratio of a quantity, (K,), to its maximum; None if the quantity is not limited."""
     if largest is None or np.isinf(largest):
         return None
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the sizes divided by the largest allowed one, (K, 1)."""
+        """Return the quantity divided by its maximum, (K, 1)."""
         return sizes(states)[:, None] / largest
 
     return worst_between(motion, ratios, (subject,))
@@ -108,7 +109,7 @@ def worst_size(
 def _may_hold_more(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List the steps that may contain the largest ratio of all, (S,), and upper bounds of the ratio there, (S,)."""
+    """List the steps that may contain the largest ratio of all, (S,), and upper bounds on the ratio in them, (S,)."""
     highest = ratio.max()
     candidates = []
     for begin in range(0, len(ratio), _AT_ONCE):
@@ -126,7 +127,7 @@ def _may_hold_more(
 def _open_steps(
     states: MotionStates, lengths: np.ndarray, ratio: np.ndarray, highest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List the steps that may contain a ratio above the highest known one; see `_may_hold_more`."""
+    """List the steps that may contain a ratio above the highest one known; see `_may_hold_more`."""
     inside = states.index[1:] == states.index[:-1]
     width = np.where(inside, np.diff(states.u), 1.0)
     length = (width * lengths[states.index[:-1]])[:, None]
@@ -148,7 +149,7 @@ def _open_steps(
 def largest(
     motion: CheckedMotion, ratios: Callable[[slice], tuple[np.ndarray, np.ndarray]]
 ) -> Worst:
-    """Find the largest value of polynomials in Bernstein form, with two polynomials for each piece and joint.
+    """Find the largest value of polynomials in Bernstein form; there are two polynomials for each piece and joint.
 
     The largest value is at an end of a piece, or at an extremum of a polynomial that has a coefficient above the values
     at all ends.

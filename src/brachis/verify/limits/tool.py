@@ -1,7 +1,7 @@
 """Ratios to limits of the tool: its speed, angular speed, acceleration, and deviation from the path.
 
-They are computed only from the URDF's chain and the path. Let D be the rotation of the tool relative to the orientation
-of the path, and z its third column, which is the tool's axis. Then
+The ratios are computed only from the URDF's chain and the path. Let D be the rotation of the tool relative to the
+orientation of the path. Let z be the third column of D, which is the axis of the tool. Then
 
     tilt = acos z_z,   lead = asin z_x,   side = atan2(z_y, z_z),   roll = atan2(-D_xy, D_xx).
 """
@@ -26,7 +26,7 @@ from brachis.verify.motion import CheckedMotion, MotionStates, list_speed_tables
 
 _ANGLES = ("lead", "side", "roll")
 _SAME_S = 1e-12
-"""Path coordinates that are closer to each other than this are the same."""
+"""Difference of path coordinates below which they count as the same."""
 
 
 def tool_sizes(robot: Robot, states: MotionStates, quantity: str) -> np.ndarray:
@@ -50,7 +50,7 @@ def _worst_motion(quantity: str, motion: CheckedMotion) -> Worst | None:
 def largest_speeds(
     task: Task, s: np.ndarray, side: Callable[..., np.ndarray] = np.minimum
 ) -> np.ndarray:
-    """Return the tool's largest speeds, m/s, (K,), at path coordinates; at a step, `side` chooses one of both."""
+    """Return the tool's maximum speeds, m/s, (K,), at path coordinates; at a step, `side` chooses one of two values."""
     limits = task.tool_limits
     constant = limits.speed if isinstance(limits.speed, float) else np.inf
     largest = np.full(len(s), constant)
@@ -71,7 +71,7 @@ def _worst_speed(motion: CheckedMotion) -> Worst | None:
         return _worst_motion("speed", motion)
 
     def ratios(states: MotionStates) -> np.ndarray:
-        """Return the speeds divided by the lowest limit at each s, (K,)."""
+        """Return the tool's speeds divided by the lowest limit at each s, (K,)."""
         speeds = tool_sizes(motion.robot, states, "speed")
         return speeds / largest_speeds(motion.task, states.s)
 
@@ -79,7 +79,7 @@ def _worst_speed(motion: CheckedMotion) -> Worst | None:
 
 
 def _worst_deviation(name: str, motion: CheckedMotion) -> Worst | None:
-    """Find the largest ratio of the tilt, or of the distance from the path, to its allowed value."""
+    """Find the largest ratio of the tool's tilt, or of its distance from the path, to the allowed value."""
     tolerances = motion.task.tolerances
     is_tilt = name == "tilt"
     largest = tolerances.orientation.tilt if is_tilt else tolerances.position.sphere
@@ -119,7 +119,7 @@ def _worst_range(motion: CheckedMotion) -> Worst | None:
 
 
 def _deviations(motion: CheckedMotion, states: MotionStates) -> dict[str, np.ndarray]:
-    """Return angles, degrees, and displacements, m, between the tool and its place on the path, (K,) each."""
+    """Return angles, degrees, and displacements, m, of the tool from its place on the path, (K,) each."""
     joints = joint_placements(motion.robot, states.q)
     origin, rotation = real_tool_placements(motion.robot, *joints)
     target = motion.path.sample(np.clip(states.s, 0.0, 1.0)).target
