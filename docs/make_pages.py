@@ -282,7 +282,7 @@ SHOWN = {
     "joint_paths": Shown(
         "Joint paths: toppra",
         about="15 paths of the KUKA iiwa 14 go through three to seven random waypoints. The plans of brachis are "
-        "refined and verified; toppra meets limits at its grid points. Rows name the number of intervals.",
+        "refined and verified; toppra meets limits at its grid points. Each row states its number of intervals.",
     ),
     "controllers": Shown("Motions as controllers run them"),
     "jerk_paths": Shown(

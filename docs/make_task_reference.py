@@ -273,8 +273,8 @@ CSV = """
 
 `csv: {file: poses.csv}` is a smooth curve along the points of a file, one per row. The first line names the columns, in
 any order. Empty lines and lines that begin with `#` are skipped. Columns are named like the rows of the task space
-(`x,y`, `x,y,z,yaw`, ...); for `axis` give an orientation as below. For a joint path, columns are named like the joints
-(rad, m), and `units` and `tolerance` do not apply. For poses the columns are
+(`x,y`, `x,y,z,yaw`, ...); for `axis` give an orientation as below. For a joint path, each column has the name of its
+joint and is in rad or m; `units` and `tolerance` do not apply. For poses the columns are
 
 - `x,y,z`: positions, with the `orientation` of the segment;
 - `x,y,z,qw,qx,qy,qz`: positions and unit quaternions;

@@ -89,7 +89,7 @@ def plan_for_controller(
     boundary = loaded.boundary
     if boundary.start_speed or boundary.end_speed or boundary.periodic:
         raise InputError(
-            "a motion for a controller starts and ends at rest",
+            "a motion for a controller must start and end at rest",
             where="boundary",
             allowed="neither start_speed nor end_speed, and not periodic",
         )

@@ -186,7 +186,7 @@ class _Chain:
 def _nearest_ideal(
     axis: np.ndarray, fixed: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
-    """Make a direction exactly parallel to a fixed one, or else perpendicular to one or two, if it almost is."""
+    """Make a direction exactly parallel, or exactly perpendicular, to fixed directions if it almost is."""
     for fixed_axis in fixed:
         if np.linalg.norm(np.cross(axis, fixed_axis)) < tolerance:
             return fixed_axis * np.sign(axis @ fixed_axis)

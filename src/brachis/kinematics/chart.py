@@ -286,7 +286,7 @@ def _growing(s: np.ndarray) -> np.ndarray:
 def transversality(rows: np.ndarray, null: np.ndarray) -> np.ndarray:
     """Return the smallest singular values of C N, (K,), for rows (K, r, n) and bases (K, n, r); inf if r is 0.
 
-    Rows and bases are in the scales of the joints, as in `Newton.self_motions`.
+    Rows and bases refer to the scaled joints, as in `Newton.self_motions`.
     """
     if not null.shape[2]:
         return np.full(len(null), np.inf)

@@ -1,4 +1,4 @@
-"""Checks of postures and task spaces before planning: a posture may be out of range, or too heavy to hold."""
+"""Checks before planning: a posture may be out of range, or need more torque than the joints have."""
 
 from __future__ import annotations
 

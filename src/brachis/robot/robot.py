@@ -262,7 +262,7 @@ class Robot(Summary):
         Parameters
         ----------
         **limits
-            Arguments of `LimitSpec`. A mapping by joint name changes only these joints; ``scale`` multiplies the
+            Arguments of `LimitSpec`. A mapping by joint name changes only the joints it names; ``scale`` multiplies the
             robot's present limits.
 
         Raises

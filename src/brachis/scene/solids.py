@@ -28,7 +28,7 @@ Distances from a rod of 100 km have errors above 0.1 mm, so plans close to such 
 of 10 km, they can.
 """
 _LARGEST_FILE = 32.0
-"""Maximum size of a mesh file, MB: computing the hull of such a file takes 20 s and 0.8 GB of memory."""
+"""Maximum size of a mesh file, MB. For a file of this size, computing the hull takes 20 s and 0.8 GB of memory."""
 _HULL = (True, "Qt")
 """Arguments for computing the hull: whether to keep the triangles, and the options of Qhull."""
 _THICKNESS = 0.02

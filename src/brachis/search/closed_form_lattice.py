@@ -125,7 +125,7 @@ def unique(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near_start(problem: Problem, joint: int) -> float:
-    """Return the position, m, of a prismatic joint that brings the tool closest to the path's start, others at zero."""
+    """Return the position of a slide, m, that brings the tool closest to the path's start; other joints are at 0."""
     axes = list(problem.task_map.axes)
     q = np.zeros((2, problem.robot.n))
     q[1, joint] = 1.0

@@ -115,7 +115,7 @@ def without_tolerances(task: Task) -> Task:
 def lock_idle(
     robot: Robot, task: Task, task_map: TaskMap, postures: Mapping[str, np.ndarray]
 ) -> tuple[Robot, Task] | None:
-    """Lock the idle joints, on which no row of the task space depends, in robot and task; None if none is idle.
+    """Lock the joints on which no row of the task space depends, in robot and task; return None if none is idle.
 
     Parameters
     ----------

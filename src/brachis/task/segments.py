@@ -371,8 +371,8 @@ class MovingSegment(SegmentModel):
     Null: to the orientations of a spline or of the posture, otherwise fixed."""
     speed: Positive | None = None
     """Process speed: constant speed of the tool along the segment except its blends, m/s, as in
-    tool_limits.process_speed. It replaces feed rates of points. To hold the speed on the whole segment, put short lines
-    without it before and after: a run-in and a run-out."""
+    tool_limits.process_speed. It replaces feed rates of points. To hold the speed over the whole segment, put
+    a short line without a speed before the segment (run-in), and another one after it (run-out)."""
 
     def _mistakes(self) -> Iterator[Mistake]:
         yield from super()._mistakes()

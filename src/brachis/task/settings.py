@@ -332,7 +332,7 @@ class SolverSettings(Model):
     """Settings of the solver of the optimisation problem."""
 
     name: Name = "auto"
-    """auto (starts with uno), uno, uno_interior, or ipopt if ipyopt is installed."""
+    """One of auto (tries uno first), uno, uno_interior, and ipopt (only if ipyopt is installed)."""
     max_iterations: Count = Field(default=300, ge=1, le=1_000_000)
     """Maximum number of iterations."""
     time_limit: Positive = Field(default=60.0, le=1e6)

@@ -220,9 +220,9 @@ def test_a_motion_that_goes_on_at_its_end_is_refused(tmp_path):
         brachis.examples.scara_line, end_speed=0.3, effort="single", intervals=8
     )
     for file in ("run.csv", "run.src"):
-        with pytest.raises(InputError, match="starts and ends at rest"):
+        with pytest.raises(InputError, match="must start and end at rest"):
             result.export(tmp_path / file, profile="kuka_rsi_4ms")
-    with pytest.raises(InputError, match="starts and ends at rest"):
+    with pytest.raises(InputError, match="must start and end at rest"):
         brachis.plan_for_controller("kuka_rsi_4ms", result.task)
 
 

@@ -187,7 +187,7 @@ def _check_limit(
     base: np.ndarray,
     bounds: list[LimitBound],
 ) -> CheckedSensitivity:
-    """Solve with one limit raised; if the result may belong to a different optimum, also solve unchanged from there."""
+    """Solve with one limit raised; if this may be another optimum, solve from there with the original limits too."""
     predicted = entry.change(step)
     raised = program
     for limit, bound in bounds:

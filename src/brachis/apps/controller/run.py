@@ -186,7 +186,7 @@ def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
     ends = np.abs(trajectory.qdot[[0, -1]]).max()
     if ends > _MOVING:
         raise InputError(
-            "a motion for a controller starts and ends at rest",
+            "a motion for a controller must start and end at rest",
             where="boundary",
             found=f"{ends:.3g} rad/s or m/s at an end",
             allowed="neither start_speed nor end_speed, and not periodic",

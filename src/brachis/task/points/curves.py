@@ -287,7 +287,7 @@ def _profile(*columns: Array) -> tuple[Any, ...]:
 def cut_at_corners(
     points: Points, *, stops: bool = False
 ) -> tuple[tuple[Points, ...], FitReport]:
-    """Return the sections of points, each for one curve through its points, and a report.
+    """Split the points into sections, one for each curve through them; return the sections and a report.
 
     Points are refused if the curvature of the curves would be mainly due to scatter.
 

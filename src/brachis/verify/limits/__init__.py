@@ -64,7 +64,7 @@ def check_limits(
 def _check_model(
     where: str, model: LimitModel, motion: CheckedMotion
 ) -> tuple[str, Worst]:
-    """Find the worst ratio to one of the user's own limits, and return it with the name of the limit.
+    """Find the largest ratio of a value to its bound in one of the user's own limits; return it with the limit's name.
 
     A model may have a method ``check(robot, q, qdot, qddot, tau)`` that returns ratios, (K, c), computed by a different
     formula. Without this method, the limit's own values are checked densely.
