@@ -212,7 +212,18 @@ def test_limits_of_a_profile_keep_the_margins_of_the_task(turn, tmp_path):
     profile = brachis.load_profile(path)
     stricter = robot_with_profile(robot, profile, bind_axes(profile, robot))
     assert stricter.limits.velocity[1:].tolist() == [0.5] * 6
+    assert stricter.limits.velocity_lower[1:].tolist() == [-0.5] * 6
     assert stricter.limits.velocity[0] == robot.limits.velocity[0]
+
+
+def test_velocities_of_coupled_axes_are_coupled(turn, tmp_path):
+    path = tmp_path / "cell.yaml"
+    path.write_text("extends: fanuc_stream_8ms\ncolumns: [q, qd]\ndecimals: 9\n")
+    brachis.export.write_for_controller(turn, tmp_path / "run.csv", path)
+    header, rows = read_table(tmp_path / "run.csv")
+    qdot = np.degrees(turn.velocity(rows[:-1, 0]))
+    column = header.index("qd_J3 [deg/s]")
+    np.testing.assert_allclose(rows[:-1, column], qdot[:, 3] - qdot[:, 2], atol=1e-9)
 
 
 def test_a_motion_that_goes_on_at_its_end_is_refused(tmp_path):

@@ -215,6 +215,25 @@ def test_the_rail_of_a_kuka_is_as_fast_as_the_arm(moves, seam, tmp_path):
     assert len(arm) == (2 if moves == "linear" else report.positions)
 
 
+@pytest.mark.parametrize("moves", ["joint", "linear"])
+def test_zones_and_speeds_are_those_of_the_tool(moves, seam, tmp_path):
+    text, _ = write(seam, "abb_egm_4ms", tmp_path, moves=moves)
+    positions, durations = read_rapid(text)
+    zones = [float(zone) for zone in re.findall(r"\\Z:=([\d.]+)", text)]
+    nodes = np.column_stack([1e-3 * positions[:, 6], np.radians(positions[:, :6])])
+    places, _ = seam.robot.tool_placements(nodes)
+    way = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    shorter = np.minimum(way[:-1], way[1:])
+    np.testing.assert_allclose(zones, 1e3 * BLEND * shorter, atol=1e-3)
+    text, _ = write(seam, "kuka_rsi_4ms", tmp_path, moves=moves)
+    speeds = [float(speed) for speed in re.findall(r"VEL.CP = ([\d.]+)", text)]
+    if moves == "linear":
+        middle = slice(1, -1)
+        np.testing.assert_allclose(
+            speeds[middle], (way / durations[1:])[middle], rtol=1e-2
+        )
+
+
 EVENTS = {
     "kuka_rsi_4ms": ("$OUT[1] = TRUE", "$OUT[1] = FALSE"),
     "abb_egm_4ms": ("SetDO do_process, 1;", "SetDO do_process, 0;"),

@@ -173,3 +173,49 @@ def test_heat_is_that_of_all_samples(turn):
     times = np.linspace(0.0, turn.t_end, 4001)
     mean = np.sqrt(np.mean(turn.torque(times) ** 2, axis=0))
     assert ratio == pytest.approx((mean / limits["rms_torque"]).max(), rel=0.02)
+
+
+def test_rates_of_torques_are_differences_too(seven):
+    report = brachis.verify_run(seven, "franka_1khz")
+    samples = seven.sample(0.001, last="hold")
+    qdot = np.gradient(samples.q, 0.001, axis=0)
+    qddot = np.zeros_like(qdot)
+    qddot[1:-1] = np.diff(samples.q, 2, axis=0) / 1e-6
+    tau = torques(seven, samples.q, qdot, qddot)[1:-1]
+    expected = np.abs(np.diff(tau, axis=0)).max() / 0.001 / 1000.0
+    assert value_of(report, "torque rate by differences") == pytest.approx(
+        expected, rel=1e-3
+    )
+
+
+def test_the_speed_of_the_tool_is_that_between_its_places(seam):
+    for profile in ("kuka_rsi_4ms", "fanuc_stream_8ms"):
+        report = brachis.verify_run(seam, profile)
+        assert value_of(report, "tool speed by differences") == pytest.approx(
+            1.0, abs=1e-4
+        )
+
+
+def test_limits_of_ones_own_are_checked_as_the_controller_runs(turn):
+    class Half(brachis.limits.Limit):
+        """Half of the largest velocity of the first turning joint."""
+
+        name = "half speed"
+        lower = np.array([-1.0])
+        upper = np.array([1.0])
+        labels = (brachis.limits.Label("velocity", "joint_1", "rad/s"),)
+
+        def values(self, motion):
+            """Return the velocity over half of its limit."""
+            return 2.0 * motion.qdot[:, 1:2] / self.robot.limits.velocity[1]
+
+        def partials(self, motion):
+            """Return the slope."""
+            slope = np.zeros((len(motion.q), 1, motion.q.shape[1]))
+            slope[:, 0, 1] = 2.0 / self.robot.limits.velocity[1]
+            return brachis.limits.Partials(qdot=slope)
+
+    report = brachis.verify_run(turn, "kuka_rsi_4ms", own_limits=[Half()])
+    speed = np.abs(turn.velocity(np.linspace(0.0, turn.t_end, 2001))[:, 1]).max()
+    expected = 2.0 * speed / turn.robot.limits.velocity[1]
+    assert value_of(report, "half speed ratio") == pytest.approx(expected, rel=0.01)
