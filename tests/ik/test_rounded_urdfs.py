@@ -144,7 +144,7 @@ def test_offsets_that_are_meant_are_no_rounding():
     robot = by_angles(type(arm)(arm.letters, arm.axes, tuple(steps)), ROUNDED)
     with pytest.raises(DecompositionError) as caught:
         find(robot, task_map_of(robot, "pose"), ["j3"])
-    assert "miss it by 0.005 m" in caught.value.reasons["spherical_wrist"]
+    assert "miss a common point by 0.005 m" in caught.value.reasons["spherical_wrist"]
     assert "rounds" not in str(caught.value)
 
 

@@ -306,7 +306,7 @@ def test_a_wrong_robot_beside_a_file_of_moveit_is_an_error_of_ours(robot_beside,
 def test_a_task_is_not_a_limits_file(load_beside):
     with pytest.raises(
         TaskError,
-        match=r"task.yaml: .* another kind; found a task file; allowed: a limits file",
+        match=r"task.yaml: .* a different kind; found a task file; allowed: a limits file",
     ):
         load_beside({"limits_file": "task.yaml"})
 

@@ -86,4 +86,4 @@ def test_the_timeline_says_that_no_limit_is_near(line_trajectory, with_limits):
         with_limits(line_trajectory, torque=np.full(3, 1e4), **open_range)
     ).axes[0]
     assert rows(ax) == []
-    assert any("no limit" in text.get_text() for text in ax.texts)
+    assert any("more than half of its limit" in text.get_text() for text in ax.texts)

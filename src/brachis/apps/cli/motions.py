@@ -346,7 +346,7 @@ def schema(
     out: Path | None = None,
     of: str = "task",
 ) -> None:
-    """Print the JSON schema of task files, or of exported JSON files.
+    """Print the JSON schema of tasks, or of exported JSON.
 
     Parameters
     ----------
