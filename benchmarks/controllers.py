@@ -98,7 +98,7 @@ def by_hand(motion: brachis.Trajectory, profile: str, q: np.ndarray) -> np.ndarr
         1e3 if in_degrees else 1.0,
     )
     if profile == "fanuc_stream_8ms":
-        values[:, 2] += values[:, 1]
+        values[:, 2] -= values[:, 1]
     return np.hstack([values, q[:, slides] * (1e3 if in_degrees else 1.0)])
 
 
