@@ -29,6 +29,11 @@ def test_from_a_plan_for_a_controller_to_the_run_that_came_back(
     compare = f"compare {tmp_path / 'run.csv'} --plan {out} --profile kuka_rsi_4ms"
     assert "j1 (A1)" in run(compare).out
     assert run(f"{compare} --json").data["tool"] < 1e-6
+    half = f"compare {tmp_path / 'run.csv'} --plan {out}"
+    assert "--profile: a run is compared with its plan" in error_of(half)
+    assert "--robot: this option cannot be used" in error_of(
+        f"{compare} --robot x.urdf"
+    )
     assert "the robot or the plan is missing" in error_of(
         f"compare {tmp_path / 'run.csv'}"
     )

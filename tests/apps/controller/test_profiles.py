@@ -150,7 +150,10 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
     [
         ({"dt": 0.001}, "not accept this period; found 0.001 s; allowed: 0.004 s"),
         ({"moves": "linear"}, "samples have no moves"),
-        ({"form": "json"}, "not accept this format; found json; allowed: csv, program"),
+        (
+            {"form": "json"},
+            r"not accept this format; found json; allowed: csv \(.csv\), program \(.src\)",
+        ),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         (
             {"form": "program", "time_tolerance": 1e-15},

@@ -8,6 +8,7 @@ import os
 import sys
 import warnings
 import webbrowser
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,6 +27,7 @@ from brachis.apps.cli.app import (
     urdf_of,
 )
 from brachis.apps.cli.folder import (
+    Writer,
     check_output,
     draw,
     end_cleanly,
@@ -154,13 +156,7 @@ def export(
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", formats.RunWarning)  # printed below
-            report = write_one(out, write_run, _inputs(result, trajectory))
-        code = print_run(report, json=json)
-        if not json:
-            print_lines(f"wrote {out}")
-        raise typer.Exit(code)
+        _export_run(out, write_run, _inputs(result, trajectory), json=json)
     settings = formats.format_of(out, form)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
 
@@ -182,6 +178,19 @@ def export(
             f"the period of {period:g} s is longer than the motion, which takes {trajectory.t_end:.6g} s"
         )
     print_lines(f"wrote {out}")
+
+
+def _export_run(
+    out: Path, write: Writer, inputs: Sequence[Path], *, json: bool
+) -> None:
+    """Write a file for a controller, and print what the controller makes of the motion."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", brachis.export.RunWarning)  # printed below
+        report = write_one(out, write, inputs)
+    code = print_run(report, json=json)
+    if not json:
+        print_lines(f"wrote {out}")
+    raise typer.Exit(code)
 
 
 def plot(

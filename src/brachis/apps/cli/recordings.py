@@ -94,6 +94,29 @@ def import_(
     print_lines(f"wrote {out}")
 
 
+def _compare_run(
+    csv: Path,
+    plan: Path | None,
+    profile: str | None,
+    units: dict[str, str | None],
+    *,
+    json: bool,
+) -> None:
+    """Print how a run differs from its plan."""
+    if plan is None or profile is None:
+        missing = "--plan" if plan is None else "--profile"
+        raise InputError(
+            "a run is compared with its plan in the units of a profile",
+            where=missing,
+            allowed="both --plan RESULT and --profile NAME",
+        )
+    tracking = brachis.compare_run(csv, motion_file(plan), profile, units=units)
+    if json:
+        print_json(tracking.to_dict())
+    else:
+        print_table("run and plan", ("", ""), tracking.summary().items())
+
+
 def compare(
     csv: RecordedFile,
     robot: Annotated[Path | None, Option()] = None,
@@ -132,16 +155,11 @@ def compare(
     brachis compare out/motion.csv --robot task.yaml
     brachis compare out/run.csv --plan out/result.npz --profile kuka_rsi_4ms
     """
-    if plan is not None and profile is not None:
-        refuse_options(
-            {"--out": out, "--keep-end": keep_end or None}, "--plan", "--robot"
-        )
+    if plan is not None or profile is not None:
+        options = {"--robot": robot, "--out": out, "--keep-end": keep_end or None}
+        refuse_options(options, "the plan of a run", "--robot")
         units = {"angle": angle, "length": length, "time": time}
-        tracking = brachis.compare_run(csv, motion_file(plan), profile, units=units)
-        if json:
-            print_json(tracking.to_dict())
-        else:
-            print_table("run and plan", ("", ""), tracking.summary().items())
+        _compare_run(csv, plan, profile, units, json=json)
         return
     if robot is None:
         raise InputError(

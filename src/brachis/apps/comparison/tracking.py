@@ -9,11 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller import FACTORS, Profile, axes_for, load_profile
+from brachis.apps.controller import (
+    FACTORS,
+    ControllerAxes,
+    Profile,
+    axes_for,
+    load_profile,
+)
 from brachis.apps.recording.recording import check_units, read_recording
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.trajectory import MotionSource, motion_of
+from brachis.trajectory import MotionSource, Trajectory, motion_of
+
+_DELAYS = 401
+"""Number of delays that are tried before the best one is refined: steps of 0.5 % of the longer duration."""
+_ANOTHER = 1.0
+"""Error of a joint, rad or m, above which a recording is not a run of the plan."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,54 +148,35 @@ def compare_run(
     >>> tracking.tool < 1e-6
     True
     """
-    from scipy.optimize import minimize_scalar
-
     motion = motion_of(planned, "planned")
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
     recording = read_recording(recorded, axes, check_units(units or {}))
     factors = np.array([FACTORS[unit] for unit in axes.units])
     q = axes.decode(recording.q * factors)
-    t = recording.t
-
-    def plan_at(delay: float) -> np.ndarray:
-        """Return the times in the plan, (K,), s, for a delay of the run."""
-        return np.clip(t - delay, 0.0, motion.t_end)
-
-    def miss(delay: float) -> float:
-        """Return the mean error of the joints; a single large error hardly shifts it."""
-        errors = q - motion.position(plan_at(delay))[:, axes.index]
-        return float(np.mean(np.abs(errors)))
-
-    longest = 0.5 * max(t[-1], motion.t_end)
-    coarse = np.linspace(-longest, longest, 401)
-    near = coarse[np.argmin([miss(delay) for delay in coarse])]
-    step = coarse[1] - coarse[0]
-    bounds = (near - step, near + step)
-    delay = minimize_scalar(miss, bounds=bounds, options={"xatol": 1e-9}).x
-    plan_times = plan_at(delay)
+    delay = _find_delay(motion, axes, recording.t, q)
+    plan_times = np.clip(recording.t - delay, 0.0, motion.t_end)
     planned_q = motion.position(plan_times)
     run_q = planned_q.copy()
     run_q[:, axes.index] = q
     errors = np.abs(q - planned_q[:, axes.index])
-    if errors.max() > 1.0:
+    if errors.max() > _ANOTHER:
         joint = axes.joints[int(np.argmax(errors.max(axis=0)))]
         raise InputError(
             "this recording is not a run of the plan",
             where=str(recorded),
             found=f"{joint} deviates by {errors.max():.3g} rad or m from the plan",
-            allowed="less than 1 rad or m; check the profile and the units",
+            allowed=f"at most {_ANOTHER:g} rad or m; check the profile and the units",
         )
     torques = None
     if recording.tau is not None and motion.robot.has_masses:
         planned_tau = axes.encode_torques(motion.torque(plan_times))
         torques = np.abs(recording.tau - planned_tau).max(axis=0)
     robot = motion.robot
-    places = [
-        robot.tool_placements(robot.of_real_joints(postures))[0]
-        for postures in (run_q, planned_q)
-    ]
-    away = np.linalg.norm(places[0] - places[1], axis=1)
+    run_places, _ = robot.tool_placements(robot.of_real_joints(run_q))
+    planned_places, _ = robot.tool_placements(robot.of_real_joints(planned_q))
+    away = np.linalg.norm(run_places - planned_places, axis=1)
+    worst = int(np.argmax(away))
     rows = tuple(
         AxisTracking(
             joint,
@@ -197,7 +189,30 @@ def compare_run(
         )
         for i, joint in enumerate(axes.joints)
     )
-    worst = int(np.argmax(away))
-    tool = (float(away[worst]), float(plan_times[worst]))
-    delay += recording.begin
-    return Tracking(rows, float(delay), float(t[-1]), motion.t_end, *tool)
+    return Tracking(
+        axes=rows,
+        delay=delay + recording.begin,
+        t_end=float(recording.t[-1]),
+        t_end_planned=motion.t_end,
+        tool=float(away[worst]),
+        tool_time=float(plan_times[worst]),
+    )
+
+
+def _find_delay(
+    motion: Trajectory, axes: ControllerAxes, t: np.ndarray, q: np.ndarray
+) -> float:
+    """Find the delay, s, with which joints q, (K, m), rad or m, at times t, (K,), s, are closest to a motion."""
+    from scipy.optimize import minimize_scalar
+
+    def miss(delay: float) -> float:
+        """Return the mean error of the joints; a single large error hardly shifts it."""
+        planned = motion.position(np.clip(t - delay, 0.0, motion.t_end))
+        return float(np.mean(np.abs(q - planned[:, axes.index])))
+
+    longest = 0.5 * max(t[-1], motion.t_end)
+    coarse = np.linspace(-longest, longest, _DELAYS)
+    near = coarse[np.argmin([miss(delay) for delay in coarse])]
+    step = coarse[1] - coarse[0]
+    bounds = (near - step, near + step)
+    return float(minimize_scalar(miss, bounds=bounds, options={"xatol": 1e-9}).x)

@@ -15,7 +15,13 @@ from brachis.apps.controller.profile import (
     load_profile,
     profile_names,
 )
-from brachis.apps.controller.run import RunReport, axes_for, check_period, verify_run
+from brachis.apps.controller.run import (
+    RunReport,
+    axes_for,
+    check_period,
+    nearest_on_path,
+    verify_run,
+)
 
 __all__ = [
     "FACTORS",
@@ -27,6 +33,7 @@ __all__ = [
     "bind_axes",
     "check_period",
     "load_profile",
+    "nearest_on_path",
     "profile_names",
     "robot_with_profile",
     "scale_of",

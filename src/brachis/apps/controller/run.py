@@ -21,8 +21,8 @@ from brachis.apps.controller.profile import Profile, load_profile
 from brachis.common.arrays import spread
 from brachis.common.summary import Summary
 from brachis.errors import InputError
-from brachis.path import path_of
-from brachis.robot import Robot, bind, dynamics
+from brachis.path import Path, path_of
+from brachis.robot import Robot, TaskMap, bind, dynamics
 from brachis.robot.custom_limits import LimitModel
 from brachis.trajectory import (
     MotionSource,
@@ -344,17 +344,29 @@ def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
         nodes = motion.trajectory.times
         q = np.column_stack([np.interp(t, nodes, joint) for joint in q.T])
     s = motion.trajectory.path_spline(t).clip(0.0, 1.0)
-    miss = motion.task_map.difference(
-        motion.task_map.values(q), motion.path.sample(s).target
-    )
-    along = motion.path.sample(s).xi
     # A tool that is early or late on the path has not left the path.
-    shift = np.einsum("kc,kc->k", miss, along) / np.einsum("kc,kc->k", along, along)
-    errors = path_errors(motion, q, s + shift, joint_placements(motion.robot, q))
+    s = nearest_on_path(motion.path, motion.task_map, motion.task_map.values(q), s)
+    errors = path_errors(motion, q, s, joint_placements(motion.robot, q))
     worst = int(np.argmax(errors))
     recovered = motion.trajectory.recovered
     allowed = profile.path_tolerance + (recovered.tolerance if recovered else 0.0)
     return Check("path error", errors[worst], allowed, "m, rad", time=t[worst])
+
+
+def nearest_on_path(
+    path: Path, task_map: TaskMap, values: np.ndarray, s: np.ndarray
+) -> np.ndarray:
+    """Return the path coordinates, (K,), of the points of a path that are closest to task coordinates, (K, c).
+
+    The search begins at `s`, (K,), close to them.
+    """
+    for _ in range(2):
+        sample = path.sample(s)
+        miss = task_map.difference(values, sample.target)
+        along = sample.xi
+        shift = np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
+        s = np.clip(s + shift, 0.0, 1.0)
+    return s
 
 
 def _check_differences(
@@ -428,7 +440,7 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
     """Yield changes that let a run pass, each of them verified."""
     profile = run.profile
     trials: list[list[tuple[str, _Run, float]]] = [[], [], []]
-    for decimals in range(10 if profile.decimals is None else profile.decimals, 10):
+    for decimals in range(10 if profile.decimals is None else profile.decimals + 1, 10):
         finer = profile.model_copy(update={"decimals": decimals})
         text = f"{decimals} decimals"
         trials[0].append((text, replace(run, profile=finer), period))

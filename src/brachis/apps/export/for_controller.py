@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from brachis.apps.controller import (
     verify_run,
     without_scale,
 )
-from brachis.apps.export.formats import FORMATS, format_of
+from brachis.apps.export.formats import FORMATS
 from brachis.apps.export.programs import ProgramReport, write_program
 from brachis.apps.export.rows import JointRows
 from brachis.common.files import atomic_write, file_name
@@ -98,34 +99,21 @@ def write_for_controller(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    file = file_name(path, "path")
-    tables = [name for name, known in FORMATS.items() if known.step is None]
-    check_names("format of samples", profile.formats, tables, "profile.formats")
-    language = profile.program
-    is_program = form == PROGRAM
-    if language is not None and form is None:
-        known = [
-            name for name in profile.formats if FORMATS[name].suffix == file.suffix
-        ]
-        is_program = file.suffix == language.suffix and not known
-    if is_program and language is not None:
-        text, deviation = write_program(
+    name = _name_format(profile, file_name(path, "path").suffix, form)
+    if name == PROGRAM:
+        report = _write_program(
             motion,
+            path,
             profile,
             axes,
-            file.stem,
             moves=moves,
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
-        beginning = rb"(?s)" + re.escape(text.partition("\n")[0]).encode()
-        with atomic_write(path, beginning + rb".{0,900}planned by brachis") as stream:
-            stream.write(text.encode())
         robot = robot_with_profile(without_scale(motion.robot), profile, axes)
         verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
-        deviation = replace(deviation, failures=verification.failures)
-        _warn(profile, deviation.failures)
-        return deviation
+        _warn(profile, verification.failures)
+        return replace(report, failures=verification.failures)
     if moves != "joint":
         raise InputError(
             "samples have no moves",
@@ -133,22 +121,51 @@ def write_for_controller(
             found=moves,
             allowed="this option with programs of positions",
         )
-    chosen = None if is_program else format_of(path, form)
-    allowed = [*profile.formats, *([PROGRAM] if language else [])]
-    name = next((name for name, known in FORMATS.items() if known is chosen), form)
-    if chosen is None or name not in allowed:
+    period = check_period(profile, dt)
+    run = verify_run(motion, profile, period=period, own_limits=own_limits)
+    rows = _rows_of(motion, period, profile, axes)
+    with atomic_write(path, FORMATS[name].beginning) as stream:
+        FORMATS[name].writer(rows, stream)
+    _warn(profile, (*run.failures, *run.remedies))
+    return run
+
+
+def _name_format(profile: Profile, suffix: str, form: str | None) -> str:
+    """Name the format of a file for a controller: the one that is asked for, or else the first with this suffix."""
+    tables = [name for name, known in FORMATS.items() if known.step is None]
+    check_names("format of samples", profile.formats, tables, "profile.formats")
+    suffixes = {name: FORMATS[name].suffix for name in profile.formats}
+    if profile.program is not None:
+        suffixes[PROGRAM] = profile.program.suffix
+    same = [name for name, known in suffixes.items() if known == suffix]
+    name = form or next(iter(same), suffix)
+    if name not in suffixes:
+        shown = (
+            f"{known} ({known_suffix})" for known, known_suffix in suffixes.items()
+        )
         raise InputError(
             "the controller does not accept this format",
             where="format",
-            found=name,
-            allowed=f"{', '.join(allowed)} ({profile.title})",
+            found=name or "no suffix",
+            allowed=f"{', '.join(shown)}: {profile.title}",
         )
-    period = check_period(profile, dt)
-    report = verify_run(motion, profile, period=period, own_limits=own_limits)
-    rows = _rows_of(motion, period, profile, axes)
-    with atomic_write(path, chosen.beginning) as stream:
-        chosen.writer(rows, stream)
-    _warn(profile, (*report.failures, *report.remedies))
+    return name
+
+
+def _write_program(
+    motion: Trajectory,
+    path: str | os.PathLike[str],
+    profile: Profile,
+    axes: ControllerAxes,
+    **options: Any,
+) -> ProgramReport:
+    """Write a program of positions; see `write_program`."""
+    name = file_name(path, "path").stem
+    text, report = write_program(motion, profile, axes, name, **options)
+    first_line = re.escape(text.partition("\n")[0]).encode()
+    beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
+    with atomic_write(path, beginning) as stream:
+        stream.write(text.encode())
     return report
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller import ControllerAxes, Profile
+from brachis.apps.controller import ControllerAxes, Profile, nearest_on_path
 from brachis.apps.export.rows import require_library
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
@@ -129,42 +129,23 @@ def write_program(
             found=", ".join(axes.names),
             allowed="only the joints of the arm",
         )
-    jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
-    sandbox = require_library("jinja2.sandbox", "a program", extra="report")
     events = dict(_events(motion, profile))
     follower = _Follower(motion, is_linear=moves == "linear")
     if follower.is_linear:
         follower.check_arm(axes)
-    share = 1.0
-    for _ in range(_ROUNDS):
-        nodes = follower.choose(share * tolerance, share * time_tolerance)
-        place, time = follower.deviate(nodes, follower.t)
-        passes = place <= tolerance and time <= time_tolerance
-        if passes or len(nodes) > _MOST:
-            break
-        share *= _STRICTER
-    if not passes:
-        raise InputError(
-            "no program of positions is within the tolerance",
-            where="tolerance",
-            found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
-            allowed=f"up to {_MOST} positions",
-        )
+    nodes, place, time = follower.choose_within(tolerance, time_tolerance)
     if follower.is_linear:
         follower.check_postures(nodes, axes)
     report = ProgramReport(len(nodes), place, time)
     largest = _largest_velocities(motion.robot)
+    if "percent" in language.template and not follower.is_linear:
+        _check_velocities(largest, axes)
     columns = follower.describe(nodes, axes, largest)
     steps = [
         {name: column[row].tolist() for name, column in columns.items()}
         | {"event": events.get(time, "")}
         for row, time in enumerate(follower.t[nodes].tolist())
     ]
-    if "percent" in language.template and not follower.is_linear:
-        _check_velocities(largest, axes)
-    environment = sandbox.SandboxedEnvironment(
-        undefined=jinja.StrictUndefined, keep_trailing_newline=True
-    )
     fields = {
         "date": datetime.now(tz=UTC).date().isoformat(),
         "name": name,
@@ -177,13 +158,29 @@ def write_program(
         "velocities": np.abs(axes.encode_rates(largest[None])[0]).tolist(),
         "steps": steps,
     }
+    return _render(language.template, fields), report
+
+
+def _render(template: str, fields: dict[str, Any]) -> str:
+    """Fill a template of the user's, which cannot run code.
+
+    Raises
+    ------
+    InputError
+        It is not a template, or uses a variable that does not exist.
+    """
+    jinja = require_library("jinja2", "a program", library="Jinja2", extra="report")
+    sandbox = require_library("jinja2.sandbox", "a program", extra="report")
+    environment = sandbox.SandboxedEnvironment(
+        undefined=jinja.StrictUndefined, keep_trailing_newline=True
+    )
     try:
-        text = environment.from_string(language.template).render(fields)
+        text: str = environment.from_string(template).render(fields)
     except jinja.TemplateError as error:
         raise InputError(
             "the template is wrong", where="profile.program.template", found=str(error)
         ) from error
-    return text, report
+    return text
 
 
 def _check_velocities(largest: np.ndarray, axes: ControllerAxes) -> None:
@@ -232,6 +229,32 @@ class _Follower:
         self.followed = self.task_map.values(self.q) if is_linear else self.q
         self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
 
+    def choose_within(
+        self, tolerance: float, time_tolerance: float
+    ) -> tuple[np.ndarray, float, float]:
+        """Choose positions whose rounded corners are within the tolerances too; return the deviations with them.
+
+        Raises
+        ------
+        InputError
+            They would be too many.
+        """
+        share = 1.0
+        for _ in range(_ROUNDS):
+            nodes = self.choose(share * tolerance, share * time_tolerance)
+            place, time = self.deviate(nodes, self.t)
+            if place <= tolerance and time <= time_tolerance and len(nodes) <= _MOST:
+                return nodes, place, time
+            if len(nodes) > _MOST:
+                break
+            share *= _STRICTER
+        raise InputError(
+            "no program of positions is within the tolerance",
+            where="tolerance",
+            found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
+            allowed=f"up to {_MOST} positions",
+        )
+
     def choose(self, tolerance: float, time_tolerance: float) -> np.ndarray:
         """Choose the positions, (N,) indices of times, with lines as long as the tolerances allow."""
 
@@ -264,21 +287,13 @@ class _Follower:
         values = nominal(self.t[nodes], self.followed[nodes], rests, t)
         if not self.is_linear:
             values = self.task_map.values(values)
-        s = self.motion.path_coordinate(t)
-        for _ in range(2):  # to the nearest point of the path
-            s = np.clip(s + self._step(values, s), 0.0, 1.0)
+        planned = self.motion.path_coordinate(t)
+        s = nearest_on_path(self.path, self.task_map, values, planned)
         miss = self.task_map.difference(values, self.path.sample(s).target)
         moves = np.append(True, np.diff(self.s) > 0.0)
         late = np.abs(np.interp(s, self.s[moves], self.t[moves]) - t)
         fast = self.motion.path_spline(t, nu=1) > _SLOW / self.motion.t_end
         return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
-
-    def _step(self, values: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the step along the path, (k,), towards given task coordinates, (k, c)."""
-        sample = self.path.sample(s)
-        miss = self.task_map.difference(values, sample.target)
-        along = sample.xi
-        return np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
 
     def check_arm(self, axes: ControllerAxes) -> None:
         """Refuse lines of the tool where the controller's inverse kinematics would not be that of six joints."""
