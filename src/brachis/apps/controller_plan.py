@@ -99,26 +99,26 @@ def plan_for_controller(
         loaded = loaded.model_copy(update={"spline": spline})
     unscaled = without_scale(robot)
     factors = scale_of(robot)
-    known: Result | None = None
+    last_result: Result | None = None
     for number in range(_ROUNDS):
-        asked = loaded.model_copy(update={"robot": robot.settings})
+        scaled_task = loaded.model_copy(update={"robot": robot.settings})
         try:
             result = plan(
                 robot,
-                asked,
-                start_from=known,
+                scaled_task,
+                start_from=last_result,
                 own_limits=own_limits,
                 listener=listener,
             )
         except BrachisError:
-            if known is None:
+            if last_result is None:
                 raise
-            result = known
+            result = last_result
             break
-        known = result
+        last_result = result
         run = verify_run(result, profile, own_limits=own_limits)
         smaller = _find_factors(run, robot, is_first=number == 0)
-        if run.passed or not smaller:
+        if run.passed or not smaller or number == _ROUNDS - 1:
             break
         report(f"run by {profile.title}: {'; '.join(run.failures)}; planning again")
         factors |= {kind: factors.get(kind, 1.0) * smaller[kind] for kind in smaller}

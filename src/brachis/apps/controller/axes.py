@@ -124,10 +124,10 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
         for axis, joint in zip(axes, joints, strict=True)
     ]
     coupling = np.eye(len(axes))
-    for name, others in profile.coupled.items():
-        check_names("axis", [name, *others], axis_names, "profile.coupled")
-        for other, factor in others.items():
-            coupling[axis_names.index(name), axis_names.index(other)] += factor
+    for name, factors in profile.coupled.items():
+        check_names("axis", [name, *factors], axis_names, "profile.coupled")
+        for source, factor in factors.items():
+            coupling[axis_names.index(name), axis_names.index(source)] += factor
     if abs(np.linalg.det(coupling)) < _SINGULAR:
         raise InputError(
             "the axes do not determine the joints",
@@ -178,7 +178,7 @@ def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
             raise InputError(
                 problem if name is None else "two axes have one name",
                 where="profile",
-                found=name or ", ".join(other.joint for other in axes),
+                found=name or ", ".join(entry.joint for entry in axes),
                 allowed=", ".join(group.names) if name is None else "one name each",
                 hint="Name the axes in a profile of your own; a rail has external: true",
             )

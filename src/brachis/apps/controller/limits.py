@@ -40,9 +40,11 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
         for joint, value in by_joint.items():
             if value == FROM_URDF:
                 continue
-            own = np.array(value if isinstance(value, tuple) else (-value, value))
+            stated_ends = np.array(
+                value if isinstance(value, tuple) else (-value, value)
+            )
             lower, upper = ends[:, robot.joint_names.index(joint)]
-            pair = (max(lower, own[0]), min(upper, own[1]))
+            pair = (max(lower, stated_ends[0]), min(upper, stated_ends[1]))
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
     if not changes:

@@ -196,8 +196,8 @@ def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
     travel = np.ptp(trajectory.q[:, : len(names)], axis=0)
     missing = [
         name
-        for name, way in zip(names, travel, strict=True)
-        if way > _STILL and name not in axes.joints
+        for name, distance in zip(names, travel, strict=True)
+        if distance > _STILL and name not in axes.joints
     ]
     if missing:
         raise InputError(
@@ -241,9 +241,11 @@ class _Run:
             ]
             kind = _SampledMotion
         checked = kind(run, robot, task_map, path, options)
-        own = {check.name.replace("by differences", "ratio") for check in differences}
+        replaced = {
+            check.name.replace("by differences", "ratio") for check in differences
+        }
         limits = check_limits(checked, self.own_limits)
-        ratios = [check for check in limits if check.name not in own] + differences
+        ratios = [check for check in limits if check.name not in replaced] + differences
         path_check = _check_path(checked, self.profile)
         checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
         worst = max((check.value for check in ratios), default=0.0)

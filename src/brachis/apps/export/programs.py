@@ -346,15 +346,19 @@ class _Follower:
         h = np.diff(self.t[nodes])
         constant = h * (1.0 - 0.5 * BLEND * (rests[:-1].astype(float) + rests[1:]))
         tool, _ = robot.tool_placements(robot.of_real_joints(q))
-        way = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+        distance = np.linalg.norm(np.diff(tool, axis=0), axis=1)
         rates = np.abs(np.diff(q, axis=0))[:, axes.index] / constant[:, None]
         percent = 100.0 * np.max(rates / largest[axes.index], axis=1)
         waits = np.append(False, np.abs(np.diff(q, axis=0)).max(axis=1) < _REST)
-        zone = BLEND * np.minimum(np.append(0.0, way), np.append(way, 0.0)) * ~rests
+        zone = (
+            BLEND
+            * np.minimum(np.append(0.0, distance), np.append(distance, 0.0))
+            * ~rests
+        )
         return {
             "values": np.round(axes.encode(q), 9) + 0.0,
             "duration": np.append(0.0, h),
-            "speed": np.append(0.0, way / constant),
+            "speed": np.append(0.0, distance / constant),
             "percent": np.append(1.0, percent.clip(1e-3, 100.0)),
             "zone": zone,
             "passes": ~rests,

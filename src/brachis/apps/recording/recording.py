@@ -117,8 +117,8 @@ def _find_columns(header: Sequence[str], joints: Sequence[str], where: str) -> C
         key = meanings.get(name)
         if key in columns:
             problems.append(f"{_describe(*key)} occurs twice")
-        is_other = key and key[0] == "tau" and unit not in (None, "nm", "n")
-        if key is not None and not is_other:
+        has_foreign_unit = key and key[0] == "tau" and unit not in (None, "nm", "n")
+        if key is not None and not has_foreign_unit:
             columns[key] = (i, unit)
     with_torques = {joint for kind, joint in columns if kind == "tau"}
     if with_torques != set(joints):  # torques that only some joints have are left out
