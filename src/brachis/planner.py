@@ -219,6 +219,8 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
+    if not problem.task_map.is_of_tool:
+        return Search(problem, decompositions, deadline, report)
     if has_charts(problem, decompositions):
         check_regular(problem.task, problem.task_map, problem.given_postures)
     else:

@@ -350,7 +350,7 @@ def _join(
 
 
 def path_of(task_map: TaskMap, task: Task) -> Path:
-    """Build the path of a task.
+    """Build the path of a task. The path of a move prescribes nothing; its s is the share of the move.
 
     Parameters
     ----------
@@ -368,6 +368,9 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     PathError, UnknownNameError, InputError
         As for `build_path`; or ``path_start`` does not fit the task space.
     """
+    if not task_map.m:
+        nowhere = LineCurve(np.empty(0), np.empty(0), 1.0)
+        return Path.of((CurveSpan(nowhere, 0.0, 1.0),), 0, None)
     frame = None
     if task.path_frame is not None:
         frame = PathFrame.of(place_frame(task.frames, task.path_frame), task_map.rows)

@@ -94,7 +94,8 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
     """
     limits = task.tool_limits
     sections = [section for section in limits.process_speed if section.segment is None]
-    sections += _parts_of_segments(task, path)
+    if task.path:
+        sections += _parts_of_segments(task, path)
     if not sections:
         return task
     after = dict.fromkeys(path.stops.tolist(), 0.0)

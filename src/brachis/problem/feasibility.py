@@ -68,7 +68,7 @@ def check_postures(
         _check_at_rest(robot, limits, posture, key, tolerance)
         limits = tuple(_widen(limit, posture[None], tolerance) for limit in limits)
     along = path.sample(np.linspace(0.0, 1.0, 401)).target
-    if "end" in postures:
+    if "end" in postures and task_map.m:
         key = task.posture_key("end")
         check_on_path(task_map, postures["end"], along[-1], "end", key)
     if isinstance(task_map, JointSpace):

@@ -99,7 +99,7 @@ class Problem(Summary):
         at_end = task.joints_at("end")
         start = at_start and robot.posture(*at_start)
         end = at_end and robot.posture(*at_end)
-        if robot.n >= task_map.m and not isinstance(task_map, JointSpace):
+        if robot.n >= task_map.m and task_map.is_of_tool:
             check_independent(task_map)
         path = path_of(task_map, task)
         task = with_held_speeds(with_feed_rates(task, path), task_map, path)
@@ -194,6 +194,8 @@ class Problem(Summary):
 def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
     """Return the posture, (n,), at the end of the path that is closest to a given one, which may already be there."""
     place = path.sample(np.ones(1)).target
+    if not task_map.m:
+        return posture
     if isinstance(task_map, JointSpace):
         return np.asarray(place[0])
     miss = task_map.difference(place, task_map.values(posture[None]))
@@ -303,7 +305,7 @@ def decompositions_of(
     task = problem.task
     robot = problem.robot
     task_map = problem.task_map
-    if isinstance(task_map, JointSpace):
+    if not task_map.is_of_tool:
         return []
     if task.redundant_joints != "auto":
         names = _with_tool_joints(task_map, task.redundant_joints)

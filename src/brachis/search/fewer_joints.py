@@ -67,6 +67,8 @@ def _hold_idle_joints(
     deadline: Deadline,
 ) -> FinishedCandidate | None:
     """Plan again from the best motion with idle joints at rest; None if none is idle, or if moving them saves time."""
+    if not problem.task_map.m:
+        return None
     postures = problem.given_postures
     try:
         idle = lock_idle(robot, problem.task, problem.task_map, postures)

@@ -16,7 +16,6 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.optimise.backends import solvers_for
 from brachis.problem.problem import Decomposition, Problem
-from brachis.robot.task_map import JointSpace
 from brachis.search.differential_ik import STRATEGIES
 from brachis.search.guesses import (
     SEARCH_LEVELS,
@@ -28,6 +27,7 @@ from brachis.search.guesses import (
 )
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_TIME, DeadEnd
+from brachis.search.moves import move_guesses
 from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
@@ -97,11 +97,14 @@ def batches(
     """
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
-    if isinstance(problem.task_map, JointSpace):
-        guess = joint_space_guess(problem)
-        refuse_hopeless([guess])
-        for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
-            yield Batch([solver_guess], 1, fallback=number > 0)
+    if not problem.task_map.is_of_tool:
+        is_move = not problem.task_map.m
+        guesses = move_guesses(problem) if is_move else [joint_space_guess(problem)]
+        refuse_hopeless(guesses)
+        for solver in solvers:
+            is_first = solver == solvers[0]
+            solver_guesses = _with_solvers(guesses, [solver])
+            yield Batch(solver_guesses, len(guesses), fallback=not is_first)
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)

@@ -98,6 +98,24 @@ RedundantJoints = Annotated[
 Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 
+_CHOICES = {
+    "redundant_joints": "auto",
+    "branch": "auto",
+    "search.guesses": "lattice",
+    "margins.singularity": None,
+}
+"""Keys that choose postures along a path of the tool, and their defaults."""
+_OF_PATHS = {
+    "path": (),
+    "path_start": None,
+    "path_frame": None,
+    "boundary": BoundarySettings(),
+    "tool_limits.process_speed": (),
+    **_CHOICES,
+}
+"""Keys of tasks with a path, and their defaults."""
+
+
 class PathInFrame(Model):
     """A path that is given in a named frame."""
 
@@ -134,11 +152,12 @@ class Task(CheckedModel):
     nearest posture on the path is used."""
     task_space: TaskSpace
     """Coordinates that the path prescribes: position (x, y and z), pose, pose_free_roll (the tool may roll about its z
-    axis), axis, joints (all joint positions; only the timing is planned), or a list of rows: some of x, y, z, then one
-    of yaw, pitch, roll (angle about the world's z, y or x axis, rad) or axis (direction of the tool's z axis)."""
-    path: Segments
+    axis), axis, joints (all joint positions; only the timing is planned), free (nothing: a move from the start posture
+    to the end posture), or a list of rows: some of x, y, z, then one of yaw, pitch, roll (angle about the world's z, y
+    or x axis, rad) or axis (direction of the tool's z axis)."""
+    path: Segments = ()
     """List of segments; or a list of points, each with all task coordinates, for the spline through them. In a frame:
-    {frame: NAME, segments: [...]}."""
+    {frame: NAME, segments: [...]}. A move (task_space: free) has none."""
     frames: dict[Name, FramePlacement] = Field(default={})
     """Placements of frames, for example of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
@@ -236,6 +255,7 @@ class Task(CheckedModel):
     def _points_and_one_segment_are_paths(cls, path: object) -> object:
         if isinstance(path, SegmentModel | Mapping):
             return (path,)
+
         if callable(path):
             raise refuse(
                 "a curve is not a segment",
@@ -288,8 +308,13 @@ class Task(CheckedModel):
 
     def _mistakes(self) -> Iterator[Mistake]:
         self._check_names()
-        yield from self._mistakes_at_the_start()
-        yield from self._mistakes_in_the_path()
+        if self.task_space == "free":
+            yield from self._changed(_OF_PATHS, "a move has no path")
+        elif self.path:
+            yield from self._mistakes_at_the_start()
+            yield from self._mistakes_in_the_path()
+        else:
+            yield "path", "this required key is missing", "a list of segments"
         yield from self._mistakes_in_tolerances()
         yield from self._mistakes_in_splines()
 
@@ -366,18 +391,13 @@ class Task(CheckedModel):
                 "a joint path cannot be in a frame",
                 "null, with task_space: joints",
             )
-        for key, default in (
-            ("redundant_joints", "auto"),
-            ("branch", "auto"),
-            ("search.guesses", "lattice"),
-            ("margins.singularity", None),
-        ):
+        yield from self._changed(_CHOICES, "a joint path leaves no choice of postures")
+
+    def _changed(self, defaults: Mapping[str, object], why: str) -> Iterator[Mistake]:
+        """Refuse keys, given by their defaults, that this task space does not have."""
+        for key, default in defaults.items():
             if attrgetter(key)(self) != default:
-                yield (
-                    key,
-                    "a joint path leaves no choice of postures",
-                    f"{default}, with task_space: joints",
-                )
+                yield key, why, f"no such key with task_space: {self.task_space}"
 
     def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
         tolerances = self.tolerances
@@ -442,6 +462,8 @@ class Task(CheckedModel):
     @property
     def start_place(self) -> StartPlace:
         """Start of the path as stated by the first segment, in the form of `path_start`; None if it states no start."""
+        if not self.path:
+            return None
         place, turn = self.path[0].start or (None, None)
         if place is None or not self.of_poses:
             return place
@@ -467,4 +489,7 @@ class Task(CheckedModel):
         All defaults are written out, so that the result keeps its meaning if a default changes.
         ``load_task(task.to_dict()) == task``.
         """
-        return self.model_dump(mode="json")
+        written = self.model_dump(mode="json")
+        if not self.path:
+            del written["path"]
+        return written

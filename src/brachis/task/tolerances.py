@@ -23,7 +23,7 @@ from brachis.task.fields import (
 Row = Literal["x", "y", "z", "roll", "pitch", "yaw", "axis"]
 _SPACE_FORMS = (
     "a list of some of x, y, z, then at most one of roll, pitch, yaw, axis; "
-    "or one of the words position, pose, pose_free_roll, axis, joints"
+    "or one of the words position, pose, pose_free_roll, axis, joints, free"
 )
 
 EACH_ONCE = must(
@@ -46,7 +46,7 @@ def _name_space(space: str | tuple[str, ...]) -> str | tuple[str, ...]:
 
 
 TaskSpace = Annotated[
-    Literal["position", "pose", "pose_free_roll", "axis", "joints"]
+    Literal["position", "pose", "pose_free_roll", "axis", "joints", "free"]
     | Annotated[NonEmpty[Row], EACH_ONCE, _ANGLE_LAST],
     ByForm(_SPACE_FORMS),
     AfterValidator(_name_space),

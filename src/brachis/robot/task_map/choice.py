@@ -69,6 +69,8 @@ class JointSpace(TaskMap):
 
 
 JOINTS = "joints"
+FREE = "free"
+"""The task space without rows, in which a move is planned: all joints are redundant."""
 
 
 def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
@@ -88,6 +90,8 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
     """
     if rows == JOINTS:
         return JointSpace(robot, joint_rows(robot.joint_names))
+    if rows == FREE:
+        return TaskMap(robot, ())
     if rolls_freely(rows) and (
         tool_joints_of(FREE_ROLL, None)[0] not in robot.tool_joints
     ):
@@ -113,7 +117,7 @@ def task_map_of(robot: Robot, rows: str | Sequence[str]) -> TaskMap:
             where="task_space",
             found=rows,
             allowed=f"rows out of {', '.join(AXES)}, each once, and after them one of {', '.join(ANGLES)}, {AXIS}; "
-            f"or one of position, pose, {FREE_ROLL}, {JOINTS}",
+            f"or one of position, pose, {FREE_ROLL}, {JOINTS}, {FREE}",
         )
     if AXIS in names:
         return RowsAndOrientation(robot, (*positions, *TURN_ROWS))

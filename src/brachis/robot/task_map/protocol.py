@@ -106,6 +106,11 @@ class TaskMap(Summary):
         return len(self.rows)
 
     @property
+    def is_of_tool(self) -> bool:
+        """Whether the rows prescribe the tool; not in a joint space, and not without rows."""
+        return bool(self.axes or self.angles)
+
+    @property
     def units(self) -> tuple[str, ...]:
         """Unit of every row."""
         return tuple("m" if row in AXES else "rad" for row in self.rows)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import cross
-from brachis.robot.task_map import JointSpace
 from brachis.verify.limits.protocol import LimitCheck, Worst, worst_between
 from brachis.verify.mechanics import tool_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
@@ -21,7 +20,7 @@ def find_margins(motion: CheckedMotion, states: MotionStates) -> tuple[Margin, .
     margins: list[Margin] = []
     if not np.isfinite(states.q).all():
         return ()
-    if not isinstance(motion.task_map, JointSpace):
+    if motion.task_map.is_of_tool:
         singular = _singular_values(motion, states)
         k = np.argmin(singular)
         time = float(states.t[k])
