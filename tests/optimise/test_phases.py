@@ -12,9 +12,10 @@ from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverOptions, SolveStatus, solvers_for
 from brachis.optimise.boundary import EndCondition
 from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.links import CurveLink
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Program
 from brachis.path.time_law import TimeLaw
 from brachis.robot import dynamics
 from support.arrays import assert_near
@@ -98,7 +99,7 @@ def in_two_phases(knots, *, orders=(0,), points=None):
         phases = [phase.with_points(np.linspace(0.0, 1.0, points)) for phase in phases]
     if knots == "free":
         phases = [phase.with_free_knots(0.1) for phase in phases]
-    return Program(phases, [Link(0, 1, (1,), orders)])
+    return Program(phases, [CurveLink(0, 1, orders, (1,))])
 
 
 def point_in_two_phases(program):
@@ -244,7 +245,7 @@ def test_a_motion_with_another_start(orders):
     (x,) = reachable_points(phase, 1)
     motion = phase.motion(x)
     values = np.random.default_rng(2).normal(size=(orders, 2))
-    moved = motion.with_start(values, [1, 2])
+    moved = motion.with_end(0, values, [1, 2])
     curves = np.array(moved.at(np.zeros(1)))[:orders, 0, 1:]
     assert_allclose(curves, values, atol=1e-10)
     before, after = motion.control_points, moved.control_points
@@ -260,6 +261,6 @@ def test_a_start_at_rest_has_equal_points_to_the_last_digit():
         knots = clamped_knots(3, breaks)
         points = rng.uniform(-1.0, 1.0, (2, len(knots) - 4))
         motion = Motion(0.25, knots, 3, points)
-        started = motion.with_start(np.array([values, [0.0, 0.0], [0.0, 0.0]]), [0, 1])
+        started = motion.with_end(0, np.array([values, [0.0, 0.0], [0.0, 0.0]]), [0, 1])
         first = started.control_points[:, :3]
         assert_array_equal(first, np.repeat(values[:, None], 3, axis=1))

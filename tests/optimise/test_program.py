@@ -19,9 +19,10 @@ from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
 from brachis.optimise.guess import starting_point
 from brachis.optimise.improve import SolvedProgram
+from brachis.optimise.links import CurveLink
 from brachis.optimise.mesh import coarsest, optimise_knots, refine_mesh, solve_by_levels
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
 from brachis.task import SplineSettings
 from support.direct_map import DirectJointMap
@@ -54,7 +55,7 @@ def two_moves(stop=0.5, **options):
     """Move from 0 to a stop and on to LENGTH."""
     return Program(
         [move(0.0, stop, **options), move(FREE, LENGTH, **options)],
-        [Link(0, 1, ALONE, (0,))],
+        [CurveLink(0, 1, (0,), ALONE)],
     )
 
 
@@ -91,7 +92,7 @@ def test_a_stop_that_only_the_ranges_of_the_phases_bound():
     phases = [move(0.0, FREE, within(-1.0, 0.9)), move(FREE, LENGTH, within(0.65, 2.0))]
     linked, apart = (
         solve_first(Program(phases, links), stop=0.7)
-        for links in ([Link(0, 1, ALONE, (0,))], [])
+        for links in ([CurveLink(0, 1, (0,), ALONE)], [])
     )
     assert linked.report.status is SolveStatus.OPTIMAL
     assert linked.t_end == pytest.approx(bang_bang(0.9, 0.3), rel=1e-3)
@@ -123,7 +124,7 @@ def test_phases_are_solved_from_few_intervals():
         move(0.0, 0.5, degree=3, intervals=60),
         move(FREE, LENGTH, degree=3, intervals=14),
     ]
-    program = Program(phases, [Link(0, 1, ALONE, (0,))])
+    program = Program(phases, [CurveLink(0, 1, (0,), ALONE)])
     coarse = solve_first(coarsest(program))
     assert [phase.intervals for phase in coarse.program.phases] == [15, 14]
     nested = solve_by_levels(program, coarse, solve)

@@ -188,6 +188,10 @@ class ChartMap(PathMap):
         """Interpolate postures, sigma and dq/dsigma of the reference linearly, (K, n + r + n r)."""
         return self._lines(s.clip(self.s[0], self.s[-1]))
 
+    def self_motion_rows(self, s: float) -> np.ndarray:
+        """Return the rows C, (r, n), at s."""
+        return np.asarray(self.rows.at(np.array([s]))[0][0])
+
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Return y = (s, sigma), (1 + r,), in a posture, (n,); NaN if the posture is NaN."""
         return self.curves(np.array([s]), q[None])[0]

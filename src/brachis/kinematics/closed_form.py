@@ -113,6 +113,10 @@ class ClosedFormMap(PathMap):
         """Return the margins of the branch in the form that the kernel needs."""
         return self.solver.margin_formulas(self.branch, self.robot.n)
 
+    def self_motion_rows(self, _s: float) -> np.ndarray:
+        """Return the rows, (r, n), that select the redundant joints."""
+        return self._rows[:, :-1]
+
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Return y = (s, q_r), (1 + r,), in a posture, (n,)."""
         return np.append(s, q[self.redundant])

@@ -156,6 +156,15 @@ class JointMap(ABC):
         sigma = (f"sigma_{number}" for number in range(1, 1 + self.r))
         return ("s", *(self.redundant_joints or sigma))
 
+    @property
+    def is_move(self) -> bool:
+        """Whether all joints are chosen freely."""
+        return self.r == self.robot.n
+
+    def self_motion_rows(self, _s: float) -> np.ndarray:
+        """Return the linear combinations of the joints, (r, n), whose values are the redundant curves at s."""
+        return np.empty((0, self.robot.n))
+
     @abstractmethod
     def coordinates(self, s: float, q: np.ndarray) -> np.ndarray:
         """Return the values of the curves, (c,), in a posture, (n,), at path coordinate s; NaN for a posture of NaN."""

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
+from brachis.optimise.links import CurveLink
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Program
+from brachis.problem.problem import Problem
 from brachis.task import Task
-from brachis.trajectory import CONTINUOUS_TORQUE, PhaseSpline, Trajectory, join_splines
+from brachis.trajectory import (
+    CONTINUOUS_TORQUE,
+    Component,
+    PhaseSpline,
+    Trajectory,
+    join_splines,
+)
 
 
 def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajectory:
@@ -33,24 +42,116 @@ def extract_trajectory(task: Task, program: Program, x: np.ndarray) -> Trajector
     UnreachableError
         The motion leaves the branch between the collocation points.
     """
+    return make_trajectory(task, program.phases, join_motions(program, x))
+
+
+def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Trajectory:
+    """Turn a point of the program of a problem into a trajectory; raise as `extract_trajectory` does.
+
+    If the problem has several parts, the trajectory is that of a move, and has the trajectories of the parts as its
+    components.
+    """
+    if len(problem.parts) == 1:
+        return extract_trajectory(problem.task, program, x)
+    motions = join_motions(program, x)
+    components = []
+    first = 0
+    begin = 0.0
+    for part in problem.parts:
+        legs = slice(first, first + len(part.legs))
+        trajectory = make_trajectory(part.task, program.phases[legs], motions[legs])
+        components.append(Component(begin, trajectory))
+        begin += trajectory.t_end + part.legs[-1].dwell
+        first = legs.stop
+    return _compose(problem, components, begin)
+
+
+def _compose(
+    problem: Problem, components: Sequence[Component], end: float
+) -> Trajectory:
+    """Join components, with a wait after each that does not end when the next one begins, to the motion of a move.
+
+    The path coordinate of component k of n goes from k / n to (k + 1) / n.
+    """
+    robot = problem.robot
+    count = len(components)
+    begins = [component.begin for component in components]
+    splines: list[PhaseSpline] = []
+    nodes: list[Nodes] = []
+    for number, component in enumerate(components):
+        trajectory = component.trajectory
+        motion = (
+            trajectory.q,
+            trajectory.qdot,
+            trajectory.qddot,
+            trajectory.qddot_before,
+        )
+        nodes.append(
+            Nodes(trajectory.times, *(values[:, : robot.n] for values in motion))
+        )
+        for spline in trajectory.phase_splines:
+            s = (number + spline.control_points[:1]) / count
+            splines.append(replace(spline, control_points=s))
+        wait = ([*begins, end])[number + 1] - component.end
+        if wait > 0.0:
+            splines.append(splines[-1].wait(wait))
+            nodes.append(_stand_still(nodes[-1], wait))
+    joined = join_nodes(nodes)
+    knots, control_points = join_splines(splines)
+    first = components[0].trajectory
+    return Trajectory(
+        task=problem.task,
+        urdf=first.urdf,
+        robot=robot,
+        redundant_joints=(),
+        branch="",
+        times=joined.times,
+        q=joined.q,
+        qdot=joined.qdot,
+        qddot=joined.qddot,
+        qddot_before=joined.qddot_before,
+        knots=knots,
+        degree=splines[0].degree,
+        control_points=control_points,
+        phase_ends=np.cumsum([spline.t_end for spline in splines]),
+        chart_rows=np.empty((0, 0, 0)),
+        chart_knots=np.empty(0),
+        own_limits=first.own_limits,
+        components=tuple(components),
+    )
+
+
+def make_trajectory(
+    task: Task, phases: Sequence[Phase], motions: Sequence[Motion]
+) -> Trajectory:
+    """Return the trajectory of successive phases in coordinates of one joint map; raise as `extract_trajectory` does.
+
+    Parameters
+    ----------
+    task : Task
+    phases : sequence of Phase
+    motions : sequence of Motion
+        Motions of the phases; see `join_motions`.
+    """
     sections: list[_Section] = []
-    for phase, motion in zip(program.phases, _join(program, x), strict=True):
+    for phase, motion in zip(phases, motions, strict=True):
         before = sections[-1] if sections else None
         if before is not None and before.pause:
             sections.append(before.wait())
         sections.append(_Section.of(phase, motion, before))
     splines = [section.spline for section in sections]
     knots, control_points = join_splines(splines)
-    joint_map = program.phases[0].joint_map
+    joint_map = phases[0].joint_map
     rows = np.empty((0, 0, 0))
     chart_knots = np.empty(0)
     if isinstance(joint_map, ChartMap):
         rows = joint_map.rows.coefficients
         chart_knots = joint_map.rows.knots
     nodes = join_nodes([section.nodes for section in sections])
-    limits = program.phases[0].limits
     own_limits = tuple(
-        limit.name for limit in limits if limit.origin.startswith("own_limits")
+        limit.name
+        for limit in phases[0].limits
+        if limit.origin.startswith("own_limits")
     )
     return Trajectory(
         task=task,
@@ -99,26 +200,56 @@ class _Section:
 
     def wait(self) -> _Section:
         """Return the section of the pause, in which the arm waits at rest where this section ends."""
-        q = np.tile(self.nodes.q[-1], (2, 1))
-        still = np.zeros_like(q)
-        times = np.array([0.0, self.pause])
-        nodes = Nodes(times, q, still, still, still)
+        nodes = _stand_still(self.nodes, self.pause)
         return _Section(self.spline.wait(self.pause), nodes)
 
 
-def _join(program: Program, x: np.ndarray) -> list[Motion]:
+def _stand_still(nodes: Nodes, duration: float) -> Nodes:
+    """Return the nodes of a wait in the posture in which a motion ends."""
+    q = np.tile(nodes.q[-1], (2, 1))
+    still = np.zeros_like(q)
+    return Nodes(np.array([0.0, duration]), q, still, still, still)
+
+
+def join_motions(program: Program, x: np.ndarray) -> list[Motion]:
     """Return the motions of all phases, linked exactly. A solver links phases only to within its tolerance."""
     motions = program.motions(x)
+    states = program.states(x)
     for link in program.links:
-        before = motions[link.before]
-        last = np.array(before.at(np.array([before.t_end])))[:, 0]
-        motions[link.after] = _begin_with(
-            motions[link.after], program.phases[link.after], link, last
-        )
+        if isinstance(link, CurveLink):
+            before = motions[link.before]
+            last = np.array(before.at(np.array([before.t_end])))[:, 0]
+            after = program.phases[link.after]
+            motions[link.after] = _begin_with(motions[link.after], after, link, last)
+        else:
+            # A move is changed, because its curves are the joints.
+            sides = [(link.before, -1), (link.after, 0)]
+            is_move = program.phases[link.before].joint_map.is_move
+            (moved, end), (kept, place) = sides if is_move else sides[::-1]
+            state = states[kept]
+            orders = np.array([state.q, state.qdot, state.qddot])[:, place]
+            linked = orders[: 1 + max(link.orders)]
+            motions[moved] = _meet(motions[moved], program.phases[moved], end, linked)
     return motions
 
 
-def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> Motion:
+def _meet(motion: Motion, phase: Phase, end: int, orders: np.ndarray) -> Motion:
+    """Return the motion of a phase that has a posture and k derivatives, (1 + k, n or more), at one end."""
+    joint_map = phase.joint_map
+    fixed = (phase.boundary.start, phase.boundary.end)[end][-1].derivatives
+    s = float(motion.at(np.array([0.0, motion.t_end])[[end]])[0][0, 0])
+    y = joint_map.coordinates(s, orders[0, : joint_map.robot.n])[1:]
+    values = np.zeros((max(1 + len(fixed), len(orders)), len(y)))
+    values[0] = y
+    # Only moves have derivatives that are linked: their curves are the joints.
+    values[1 : len(orders)] = orders[1:, : len(y)]
+    curves = range(1 - phase.boundary.law_curves, len(motion.control_points))
+    return motion.with_end(end, values, list(curves))
+
+
+def _begin_with(
+    motion: Motion, phase: Phase, link: CurveLink, last: np.ndarray
+) -> Motion:
     """Return the motion with a new start: a link sets some values and derivatives to those of `last`, (4, c)."""
     orders = np.array(motion.at(np.zeros(1)))[:, 0]
     fixed_derivatives = phase.boundary.start[-1].derivatives
@@ -129,4 +260,4 @@ def _begin_with(motion: Motion, phase: Phase, link: Link, last: np.ndarray) -> M
     orders[joined] = last[joined]
     count = 1 + max(fixed_orders, *link.orders)
     curves = [curve - phase.boundary.law_curves for curve in link.curves]
-    return motion.with_start(orders[:count, list(link.curves)], curves)
+    return motion.with_end(0, orders[:count, list(link.curves)], curves)

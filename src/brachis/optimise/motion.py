@@ -93,24 +93,29 @@ class Motion(PhaseSpline):
         points = insert_knots(self.control_points, self.knots, knots, self.degree)
         return replace(self, knots=knots, control_points=points)
 
-    def with_start(self, values: np.ndarray, curves: Sequence[int]) -> Motion:
-        """Return the motion with new values and derivatives at its beginning.
+    def with_end(self, end: int, values: np.ndarray, curves: Sequence[int]) -> Motion:
+        """Return the motion with new values and derivatives at one end.
 
         Parameters
         ----------
+        end : int
+            0 for the beginning, -1 for the end.
         values : (1 + k, c) ndarray
             Values and derivatives per second, one order after the other.
         curves : sequence of int
             Indices of the c curves among those that have control points.
         """
-        orders = np.arange(len(values))[:, None]
-        _, basis = local_basis(self.knots, self.degree, np.zeros(1))
-        matrix = basis[: len(values), 0, : len(values)]
+        count = len(values)
+        orders = np.arange(count)[:, None]
+        t_norm = np.array([float(end != 0)])
+        near = slice(None, count) if end == 0 else slice(-count, None)
+        _, basis = local_basis(self.knots, self.degree, t_norm)
+        matrix = basis[:count, 0, near]
         points = self.control_points.copy()
         # Basis functions add up to 1. If derivatives are zero, points are therefore equal to the last digit.
         slopes = np.concatenate([0.0 * values[:1], (values * self.t_end**orders)[1:]])
-        first = values[0] + np.linalg.solve(matrix, slopes)
-        points[curves, : len(values)] = first.T
+        nearest = values[0] + np.linalg.solve(matrix, slopes)
+        points[curves, near] = nearest.T
         return replace(self, control_points=points)
 
     def as_spline(self) -> PhaseSpline:

@@ -27,10 +27,11 @@ from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
+from brachis.optimise.links import CurveLink, Link, PostureLink
 from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.program import Link, PhaseSequence
+from brachis.optimise.program import PhaseSequence
 from brachis.timing import Course, TimedCourse
 
 _DEGREE = 3
@@ -185,7 +186,7 @@ class PathPhase:
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
             for j, condition in enumerate(conditions[1:]):
                 if np.isfinite(condition.value):
-                    place = self.place_of(j, end)
+                    place = self.places_at(end)[j]
                     self.start[place] = condition.value
                     is_fixed[place] = True
         lower = np.full(len(self.start), -np.inf)
@@ -212,9 +213,10 @@ class PathPhase:
         inner = np.maximum(timed_squares[1:-1], _SLOWEST)
         self.start[1 : len(self._s) - 1] = inner
 
-    def place_of(self, curve: int, end: int) -> int:
-        """Return the index of the variable that is a redundant curve's value at the start (0) or end (-1)."""
-        return len(self._s) + curve * self._count + end % self._count
+    def places_at(self, end: int) -> np.ndarray:
+        """Return the indices, (r,), of the variables that are the redundant curves' values at an end (0 or -1)."""
+        curves = np.arange(self.curves_count)
+        return len(self._s) + curves * self._count + end % self._count
 
     def _basis_at(self, s: np.ndarray) -> LocalBasis:
         """Return the curves' basis functions at path coordinates, (S,), and their derivatives with respect to s."""
@@ -368,13 +370,18 @@ class PathProgram(PhaseSequence[PathPhase]):
         super().__init__(phases)
         first = self.first_variables
         self.start = np.concatenate([phase.start for phase in self.phases])
-        joins = [(link.before, link.after, link.curves) for link in links]
+        self._links = [link for link in links if isinstance(link, PostureLink)]
+        joins = [
+            (link.before, link.after, link.curves)
+            for link in links
+            if isinstance(link, CurveLink)
+        ]
         if self.phases[0].phase.boundary.periodic:
             joins.append((0, 0, tuple(range(1, 1 + self.phases[0].curves_count))))
         pairs = [
             (
-                first[before] + self.phases[before].place_of(curve - 1, -1),
-                first[after] + self.phases[after].place_of(curve - 1, 0),
+                first[before] + self.phases[before].places_at(-1)[curve - 1],
+                first[after] + self.phases[after].places_at(0)[curve - 1],
             )
             for before, after, curves in joins
             for curve in curves
@@ -389,9 +396,22 @@ class PathProgram(PhaseSequence[PathPhase]):
             columns.append(phase.jacobian_columns + column)
             row += len(phase.lower)
         numbers = row + np.arange(len(self._pairs))
+        rows.append(np.repeat(numbers, 2))
+        columns.append(self._pairs.ravel())
+        row += len(self._pairs)
+        for link in self._links:
+            places = [
+                first[number] + self.phases[number].places_at(end)
+                for number, end in ((link.before, -1), (link.after, 0))
+            ]
+            at_ends = np.concatenate(places)
+            numbers = row + np.arange(link.width)
+            rows.append(np.repeat(numbers, len(at_ends)))
+            columns.append(np.tile(at_ends, link.width))
+            row += link.width
         self.value_numbers = self._number_values()
-        self.jacobian_rows = np.concatenate([*rows, np.repeat(numbers, 2)])
-        self.jacobian_columns = np.concatenate([*columns, self._pairs.ravel()])
+        self.jacobian_rows = np.concatenate(rows)
+        self.jacobian_columns = np.concatenate(columns)
 
     def _number_values(self) -> np.ndarray:
         """Give each limit value of a phase, and each join, a number; return the number for each row, (c,)."""
@@ -400,18 +420,23 @@ class PathProgram(PhaseSequence[PathPhase]):
         for phase in self.phases:
             numbers.append(first + phase.value_numbers)
             first = 1 + int(numbers[-1].max(initial=first - 1))
-        return np.concatenate([*numbers, first + np.arange(len(self._pairs))])
+        return np.concatenate([*numbers, first + np.arange(self._joined)])
+
+    @property
+    def _joined(self) -> int:
+        """Number of rows of links."""
+        return len(self._pairs) + sum(link.width for link in self._links)
 
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of the rows, (c,)."""
-        joined = np.zeros(len(self._pairs))
+        joined = np.zeros(self._joined)
         return np.concatenate([*(phase.lower for phase in self.phases), joined])
 
     @property
     def upper(self) -> np.ndarray:
         """Upper bounds of the rows, (c,)."""
-        joined = np.zeros(len(self._pairs))
+        joined = np.zeros(self._joined)
         return np.concatenate([*(phase.upper for phase in self.phases), joined])
 
     def narrow(self, x: np.ndarray) -> float:
@@ -437,13 +462,36 @@ class PathProgram(PhaseSequence[PathPhase]):
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Compute the values of the rows, (c,); raise UnreachableError if the joint map has no posture."""
         before, after = x[self._pairs].T
-        rows = [phase.rows(x_of_phase) for phase, x_of_phase in self.split(x)]
-        return np.concatenate([*rows, before - after])
+        parts = self.split(x)
+        rows = [phase.rows(x_of_phase) for phase, x_of_phase in parts]
+        rows.append(before - after)
+        for link in self._links:
+            last, first = (
+                link.combine(phase.evaluate(x_of_phase).motion.q[end])
+                for (phase, x_of_phase), end in self._sides(link, parts)
+            )
+            rows.append(last - first)
+        return np.concatenate(rows)
+
+    @staticmethod
+    def _sides(
+        link: Link, parts: Sequence[tuple[PathPhase, np.ndarray]]
+    ) -> tuple[tuple[tuple[PathPhase, np.ndarray], int], ...]:
+        """Return the phases on both sides of a link, with their variables, each with the place of the link."""
+        return (parts[link.before], -1), (parts[link.after], 0)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Compute the entries of the Jacobian on its pattern, (nnz,); raise as `rows` does."""
-        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in self.split(x)]
-        return np.concatenate([*entries, np.tile([1.0, -1.0], len(self._pairs))])
+        parts = self.split(x)
+        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in parts]
+        entries.append(np.tile([1.0, -1.0], len(self._pairs)))
+        for link in self._links:
+            last, first = (
+                link.combine(phase.evaluate(x_of_phase).motion.gradient[end, :, 1:])
+                for (phase, x_of_phase), end in self._sides(link, parts)
+            )
+            entries.append(np.hstack([last, -first]).ravel())
+        return np.concatenate(entries)
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return s and the redundant curves of all phases at many places, (S, c) each."""

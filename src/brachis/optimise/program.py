@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
@@ -23,90 +22,11 @@ from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
 from brachis.optimise.backends import Curvature
 from brachis.optimise.evaluator import Evaluation
-from brachis.optimise.means import Means, PhasePoints
+from brachis.optimise.links import Link
+from brachis.optimise.means import Means
 from brachis.optimise.motion import Motion
 from brachis.optimise.objective import EndTime, Objective
 from brachis.optimise.phase import Phase
-
-
-@dataclass(frozen=True)
-class Link:
-    """The condition that some curves have equal values and derivatives where one phase ends and another begins.
-
-    Each value or derivative has a row that must be 0. The row is the difference between the two phases, times the
-    duration of a knot interval to the power of the derivative's order. If the joint map is the same on both sides,
-    equal curves mean equal motions.
-
-    Attributes
-    ----------
-    before, after : int
-        Numbers of the phase that ends and of the phase that begins.
-    curves : tuple of int
-        Indices of the curves that are linked.
-    orders : tuple of int
-        Orders of the derivatives that are equal: 0 for the values, 1 for the first time derivatives, ...
-    """
-
-    before: int
-    after: int
-    curves: tuple[int, ...]
-    orders: tuple[int, ...]
-
-    @property
-    def size(self) -> int:
-        """Number of rows of the link."""
-        return len(self.curves) * len(self.orders)
-
-    def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
-        """Return the factors on the rows of each order, (orders, 1)."""
-        interval = x[0] * (1.0 - phase.breaks[-2])
-        return interval ** np.array(self.orders)[:, None]
-
-    def rows(self, phase_points: PhasePoints) -> np.ndarray:
-        """Compute the values of the rows, by order and curve. `phase_points` are all phases with their variables."""
-        chosen = np.ix_(self.orders, self.curves)
-        last = _curves_at(*phase_points[self.before], -1)[chosen]
-        first = _curves_at(*phase_points[self.after], 0)[chosen]
-        return (self._scales(*phase_points[self.before]) * (last - first)).ravel()
-
-    def pattern(
-        self, phases: Sequence[Phase], first: Sequence[int]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows, counted from 0, and columns of the Jacobian's entries, (nnz,) each.
-
-        Parameters
-        ----------
-        phases : sequence of Phase
-            All phases of the program.
-        first : sequence of int
-            Index of the first variable of each phase.
-        """
-        last = phases[self.before].end_pattern(-1) + first[self.before]
-        begin = phases[self.after].end_pattern(0) + first[self.after]
-        columns = np.concatenate([last, begin])
-        rows = np.repeat(np.arange(self.size), len(columns))
-        return rows, np.tile(columns, self.size)
-
-    def jacobian(self, phase_points: PhasePoints) -> np.ndarray:
-        """Compute the entries of the Jacobian on the pattern, (nnz,)."""
-        orders = np.array(self.orders)
-        chosen = np.ix_(self.orders, self.curves)
-        phase, x = phase_points[self.before]
-        after, x_after = phase_points[self.after]
-        scales = self._scales(phase, x)
-        last = scales[:, :, None] * phase.end_slopes(x, -1)[chosen]
-        first = -scales[:, :, None] * after.end_slopes(x_after, 0)[chosen]
-        # The scales grow with the duration.
-        growth = (
-            orders[:, None] / x[0] * self.rows(phase_points).reshape(len(orders), -1)
-        )
-        last[:, :, phase.end_pattern(-1) == 0] += growth[:, :, None]
-        return np.concatenate([last, first], axis=2).ravel()
-
-
-def _curves_at(phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
-    """Return value and time derivatives of all curves at a collocation point, (4, c)."""
-    return np.array([curves[point] for curves in phase.state(x).curves])
 
 
 class _HasVariables(Protocol):

@@ -294,7 +294,7 @@ def improve_joint_paths(
         )
 
     beyond = max(map(violation_of_postures, program.phases, curves))
-    r = program.phases[0].joint_map.r
+    r = max(phase.joint_map.r for phase in program.phases)
     is_first_rough = effort.is_rough_before if r else effort.is_rough_after
     timings = time_paths(is_rough=is_first_rough)
     best = BetterPaths(tuple(curves), timings, (), beyond)

@@ -17,9 +17,10 @@ from brachis.kinematics import ChartMap, JointMap
 from brachis.optimise.boundary import Boundary, EndCondition
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.grid import FixedGrid
+from brachis.optimise.links import CurveLink, Link, PostureLink
 from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Link, Program
+from brachis.optimise.program import Program
 from brachis.problem.problem import Problem
 
 _FOR_SPEEDS = 12
@@ -82,17 +83,40 @@ def program_over(
         The motion has to be periodic, but its coordinates at the start and the end of the path differ.
     """
     is_periodic = problem.task.boundary.periodic
-    first = joint_maps[0]
-    if is_periodic and isinstance(first, ChartMap) and not first.rows.is_constant:
+    chart = joint_maps[0]
+    if is_periodic and isinstance(chart, ChartMap) and not chart.rows.is_constant:
         raise UnreachableError(
             "chart coordinates at start and end differ, so the motion cannot be periodic in them"
         )
-    phases = []
-    for number, (joint_map, grid) in enumerate(zip(joint_maps, grids, strict=True)):
-        boundary = boundary_of(problem, joint_map, number)
-        pause = problem.legs[number].dwell
-        phases.append(Phase(joint_map, problem.limits, grid, boundary, pause=pause))
-    return Program(phases, list(_links(problem, joint_maps)))
+    phases: list[Phase] = []
+    links: list[Link] = []
+    firsts = []
+    for part in problem.parts:
+        first = len(phases)
+        firsts.append(first)
+        maps = joint_maps[first : first + len(part.legs)]
+        links += _links(part, maps, first)
+        for number, joint_map in enumerate(maps):
+            boundary = boundary_of(part, joint_map, number)
+            grid = grids[first + number]
+            pause = part.legs[number].dwell
+            phases.append(Phase(joint_map, part.limits, grid, boundary, pause=pause))
+    for before, after in problem.joins:
+        last_phase = firsts[before] + len(problem.parts[before].legs) - 1
+        links.append(_join(phases, last_phase, firsts[after]))
+    return Program(phases, links)
+
+
+def _join(phases: Sequence[Phase], before: int, after: int) -> PostureLink:
+    """Link the postures in which one part ends and another begins."""
+    maps = [phases[number].joint_map for number in (before, after)]
+    joints = min(joint_map.robot.n for joint_map in maps)
+    combinations = np.eye(joints)
+    if not any(joint_map.is_move for joint_map in maps):
+        # Both postures meet the path, so only the self-motion is left.
+        most = max(maps, key=lambda joint_map: joint_map.r)
+        combinations = most.self_motion_rows(float(most is maps[0]))
+    return PostureLink(before, after, (0,), combinations)
 
 
 def maps_by_leg(
@@ -158,22 +182,29 @@ def derivatives_in_motion(problem: Problem) -> int:
     return min(order, problem.task.spline.degree - 1)
 
 
-def _links(problem: Problem, joint_maps: Sequence[JointMap]) -> Iterator[Link]:
-    """Yield links between successive phases, and in a periodic motion also from the last phase to the first."""
-    last = len(joint_maps) - 1
+def _links(
+    problem: Problem, joint_maps: Sequence[JointMap], first: int
+) -> Iterator[Link]:
+    """Yield links between successive phases, and in a periodic motion also from the last phase to the first.
+
+    The phases are numbered from `first` on.
+    """
+    several = len(joint_maps) > 1
+    last = first + len(joint_maps) - 1
     redundant = tuple(range(1, 1 + joint_maps[0].r))
     in_motion = tuple(range(1 + derivatives_in_motion(problem)))
-    for number, leg in enumerate(problem.legs[:-1] if redundant else ()):
-        yield Link(number, number + 1, redundant, (0,) if leg.stops else in_motion)
+    for number, leg in enumerate(problem.legs[:-1] if redundant else (), first):
+        orders = (0,) if leg.stops else in_motion
+        yield CurveLink(number, number + 1, orders, redundant)
     has_law = problem.time_laws[0] is not None or problem.time_laws[-1] is not None
-    if not problem.task.boundary.periodic or not (last or has_law):
+    if not problem.task.boundary.periodic or not (several or has_law):
         return
     if redundant:
         # If the start posture is given, it fixes both ends.
         orders = in_motion if problem.start is None else in_motion[1:]
-        yield Link(last, 0, redundant, orders)
+        yield CurveLink(last, first, orders, redundant)
     if not has_law:
-        yield Link(last, 0, (0,), in_motion[1:])
+        yield CurveLink(last, first, in_motion[1:], (0,))
 
 
 def breaks_of(problem: Problem) -> np.ndarray:

@@ -128,6 +128,16 @@ class Problem(Summary):
         return replace(problem, limits=limits, end=end)
 
     @property
+    def parts(self) -> tuple[Problem, ...]:
+        """The problems whose motions follow one another: only this one; see `brachis.problem.chain.ProblemChain`."""
+        return (self,)
+
+    @property
+    def joins(self) -> list[tuple[int, int]]:
+        """Numbers of the parts before and after each place where postures are free and must be equal."""
+        return []
+
+    @property
     def given_postures(self) -> dict[str, np.ndarray]:
         """Given postures, by the names ``start`` and ``end``; an end that is free is left out."""
         both = {"start": self.start, "end": self.end}

@@ -163,15 +163,7 @@ def _replace_paths(guess: InitialGuess, paths: BetterPaths) -> InitialGuess:
     """Return a guess with better joint paths, leg by leg, and their time."""
     if not np.isfinite(paths.t_end):
         return guess
-    curves = np.concatenate(paths.curves)
-    grows = np.append(True, np.diff(curves[:, 0]) > 0.0)
-    return replace(
-        guess,
-        joint_path=curves[grows],
-        estimate=paths.t_end + guess.problem.dwell_time,
-        durations=None,
-        is_improved=True,
-    )
+    return guess.with_legs(paths.curves, paths.t_end)
 
 
 def _lay_chart(better: BetterGuess) -> InitialGuess | None:

@@ -212,7 +212,7 @@ def _solve_from_timings(
     spline: SplineSettings,
 ) -> SolvedProgram | None:
     """Solve over time from splines along the timings of all phases; None if that gives no motion."""
-    r = program.phases[0].joint_map.r
+    r = max(phase.joint_map.r for phase in program.phases)
     # The product of variables and rows grows with the square of the number of intervals.
     rows = (1 + r) * len(program.lower) / program.intervals
     intervals = int(np.sqrt(_ENTRIES / rows))

@@ -8,7 +8,7 @@ checked by the verification, whether it passed or not, is a `FinishedCandidate`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from brachis.optimise.backends import SolverReport
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import maps_by_leg
+from brachis.problem.chain import ProblemChain
 from brachis.problem.problem import Problem
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
@@ -102,6 +103,18 @@ class InitialGuess(Summary):
             raise UnreachableError("the joint path leaves the branch, or the chart")
         return maps_by_leg(self.problem, self.joint_map, q[begins])
 
+    def with_legs(self, legs: Sequence[np.ndarray], time: float) -> InitialGuess:
+        """Return the guess with improved joint paths of its legs, (S, 1 + r) each, and the time of all legs, s."""
+        curves = np.concatenate(legs)
+        grows = np.append(True, np.diff(curves[:, 0]) > 0.0)
+        return replace(
+            self,
+            joint_path=curves[grows],
+            estimate=time + self.problem.dwell_time,
+            durations=None,
+            is_improved=True,
+        )
+
     def postures_at(self, s: np.ndarray) -> np.ndarray:
         """Return postures, (S, n), at path coordinates, (S,); NaN where none exists."""
         path = self.joint_path
@@ -111,6 +124,53 @@ class InitialGuess(Summary):
     def in_chart(self) -> bool:
         """Whether the coordinates are those of a chart."""
         return isinstance(self.joint_map, ChartMap)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ChainGuess(InitialGuess):
+    """Guesses of the parts of a `ProblemChain`.
+
+    Attributes
+    ----------
+    parts : tuple of InitialGuess
+    """
+
+    parts: tuple[InitialGuess, ...] = field(kw_only=True)
+
+    @classmethod
+    def of_parts(
+        cls, problem: ProblemChain, parts: Sequence[InitialGuess], estimate: float
+    ) -> ChainGuess:
+        """Combine guesses of the parts; the joint map is that with the most redundant curves."""
+        most = max(parts, key=lambda part: part.joint_map.r)
+        origin = "; ".join(part.origin for part in parts)
+        known = (problem, most.joint_map, np.empty((0, 1)), estimate, origin)
+        return cls(*known, most.family, most.solver, parts=tuple(parts))
+
+    @property
+    def legs(self) -> list[np.ndarray]:
+        """The joint paths of the legs of all parts."""
+        return [curves for part in self.parts for curves in part.legs]
+
+    def maps_by_leg(self) -> list[JointMap]:
+        """Return the joint maps of the legs of all parts."""
+        return [joint_map for part in self.parts for joint_map in part.maps_by_leg()]
+
+    def with_legs(self, legs: Sequence[np.ndarray], time: float) -> ChainGuess:
+        """Return the guess with improved joint paths of its legs."""
+        parts = []
+        first = 0
+        for part in self.parts:
+            last = first + len(part.problem.legs)
+            parts.append(part.with_legs(legs[first:last], np.inf))
+            first = last
+        estimate = time + self.problem.dwell_time
+        return replace(self, parts=tuple(parts), estimate=estimate, is_improved=True)
+
+    @property
+    def in_chart(self) -> bool:
+        """False: no chart is laid anew for the whole."""
+        return False
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -10,7 +10,7 @@ import numpy as np
 from brachis.common.words import write_count
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverReport
-from brachis.optimise.extraction import extract_trajectory
+from brachis.optimise.extraction import extract_motion
 from brachis.optimise.improve import Solve, SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions, refine
@@ -89,7 +89,7 @@ def verify(
     verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
-            trajectory = extract_trajectory(problem.task, refined.program, refined.x)
+            trajectory = extract_motion(problem, refined.program, refined.x)
             verification = verify_trajectory(trajectory, own_limits=problem.own_limits)
     joint_map = refined.program.phases[0].joint_map
     tolerance = problem.task.refinement.tolerance

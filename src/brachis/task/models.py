@@ -155,7 +155,7 @@ class Task(CheckedModel):
     axis), axis, joints (all joint positions; only the timing is planned), free (nothing: a move from the start posture
     to the end posture), or a list of rows: some of x, y, z, then one of yaw, pitch, roll (angle about the world's z, y
     or x axis, rad) or axis (direction of the tool's z axis)."""
-    path: Segments = ()
+    path: Annotated[tuple[Segment, ...], Field(max_length=3000)] = ()
     """List of segments; or a list of points, each with all task coordinates, for the spline through them. In a frame:
     {frame: NAME, segments: [...]}. A move (task_space: free) has none."""
     frames: dict[Name, FramePlacement] = Field(default={})
@@ -255,6 +255,8 @@ class Task(CheckedModel):
     def _points_and_one_segment_are_paths(cls, path: object) -> object:
         if isinstance(path, SegmentModel | Mapping):
             return (path,)
+        if path == ():  # not stated
+            return path
 
         if callable(path):
             raise refuse(

@@ -25,6 +25,7 @@ from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.phases import MotionPhase, PhaseSpline, find_phase_knots
 from brachis.trajectory.pieces import Pieces, piece_coefficients
+from brachis.trajectory.program import Component, Event, MotionPart
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
@@ -83,6 +84,12 @@ class Trajectory(Summary):
         Names of the user's own limits that were not part of the task. The limits themselves are not saved.
     sensitivities : Sensitivities or None
         The time that limits, speeds and stops cost; None if it is unknown.
+    parts : tuple of MotionPart
+        The parts of a program; empty for a single path or move.
+    events : tuple of Event
+        The events of a program, in the order of their times.
+    components : tuple of Component
+        The motions of which the motion of a program consists. Each has its own task.
 
     Examples
     --------
@@ -112,6 +119,9 @@ class Trajectory(Summary):
     recovered: Recovered | None = None
     own_limits: tuple[str, ...] = ()
     sensitivities: Sensitivities | None = None
+    parts: tuple[MotionPart, ...] = ()
+    events: tuple[Event, ...] = ()
+    components: tuple[Component, ...] = ()
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""

@@ -1,0 +1,74 @@
+"""Problems whose motions follow one another without a gap: the parts of a program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
+
+from brachis.problem.problem import Problem
+
+
+@dataclass(frozen=True, repr=False)
+class ProblemChain(Problem):
+    """A problem whose motion consists of the motions of other problems.
+
+    Its legs, limits and time laws are those of all parts. The arm stops between the parts.
+
+    Attributes
+    ----------
+    chained : tuple of Problem
+        The parts.
+    is_closed : bool
+        Whether the last part ends in the posture in which the first one begins.
+    """
+
+    chained: tuple[Problem, ...] = field(kw_only=True)
+    is_closed: bool = field(kw_only=True)
+
+    @classmethod
+    def of_parts(
+        cls,
+        whole: Problem,
+        parts: Sequence[Problem],
+        waits: Sequence[float],
+        *,
+        is_closed: bool,
+    ) -> ProblemChain:
+        """Join parts to a chain.
+
+        Parameters
+        ----------
+        whole : Problem
+            The move from the start of the first part to the end of the last one, with the settings of the planner.
+        parts : sequence of Problem
+        waits : sequence of float
+            Time for which the arm waits after each part, s.
+        is_closed : bool
+        """
+        waiting = tuple(
+            replace(part, legs=(*part.legs[:-1], replace(part.legs[-1], dwell=wait)))
+            for part, wait in zip(parts, waits, strict=True)
+        )
+        known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
+        known["legs"] = tuple(leg for part in waiting for leg in part.legs)
+        known["time_laws"] = tuple(law for part in parts for law in part.time_laws)
+        return cls(**known, chained=waiting, is_closed=is_closed)
+
+    @property
+    def parts(self) -> tuple[Problem, ...]:
+        """The problems whose motions follow one another."""
+        return self.chained
+
+    @property
+    def joins(self) -> list[tuple[int, int]]:
+        """Numbers of the parts before and after each place where postures are free and must be equal."""
+        numbers = range(len(self.chained))
+        pairs = list(pairwise(numbers))
+        if self.is_closed:
+            pairs.append((numbers[-1], 0))
+        return [
+            (before, after)
+            for before, after in pairs
+            if self.chained[before].end is None or self.chained[after].start is None
+        ]
