@@ -211,6 +211,13 @@ def _stand_still(nodes: Nodes, duration: float) -> Nodes:
     return Nodes(np.array([0.0, duration]), q, still, still, still)
 
 
+def meet(program: Program, x: np.ndarray) -> np.ndarray:
+    """Return the point x at which moves end exactly where the parts beside them begin; see `join_motions`."""
+    if all(isinstance(link, CurveLink) for link in program.links):
+        return x
+    return program.variables_from(join_motions(program, x))
+
+
 def join_motions(program: Program, x: np.ndarray) -> list[Motion]:
     """Return the motions of all phases, linked exactly. A solver links phases only to within its tolerance."""
     motions = program.motions(x)

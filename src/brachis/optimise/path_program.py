@@ -473,6 +473,25 @@ class PathProgram(PhaseSequence[PathPhase]):
             rows.append(last - first)
         return np.concatenate(rows)
 
+    def meet(self, x: np.ndarray) -> np.ndarray:
+        """Return x with the ends of moves exactly where the parts beside them begin or end.
+
+        A solver links postures only to within its tolerance. In an interval of microseconds, the rest would become a
+        jump of the torque.
+        """
+        x = x.copy()
+        for link in self._links:
+            sides = [(link.before, -1), (link.after, 0)]
+            is_move = self.phases[link.before].phase.joint_map.is_move
+            (moved, end), (kept, place) = sides if is_move else sides[::-1]
+            phase, x_of_phase = self.split(x)[kept]
+            q = phase.evaluate(x_of_phase).motion.q[place]
+            path_phase = self.phases[moved]
+            joint_map = path_phase.phase.joint_map
+            y = joint_map.coordinates(path_phase.ends[end], q[: joint_map.robot.n])
+            x[self.first_variables[moved] + path_phase.places_at(end)] = y[1:]
+        return x
+
     @staticmethod
     def _sides(
         link: Link, parts: Sequence[tuple[PathPhase, np.ndarray]]

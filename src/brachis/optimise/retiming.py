@@ -339,13 +339,12 @@ def _better(
             report = solve(over_path, report.x)
             reports = (*reports, report)
             violation = over_path.narrow(report.x)
-        timings = over_path.timings(
-            report.x, effort.places, is_rough=effort.is_rough_after
-        )
-        is_held_back = over_path.safeguard_slack(report.x) <= HELD_BACK
+        x = over_path.meet(report.x)
+        timings = over_path.timings(x, effort.places, is_rough=effort.is_rough_after)
+        is_held_back = over_path.safeguard_slack(x) <= HELD_BACK
     except UnreachableError:
         return replace(best, reports=reports, is_credible=False)
-    paths = BetterPaths(over_path.curves(report.x), timings, reports, violation)
+    paths = BetterPaths(over_path.curves(x), timings, reports, violation)
     missed = 1.0 - report.objective / paths.t_end
     # If the speed is given, the phase plane does not show whether the limits allow it.
     has_laws = any(timing.fixed_duration is not None for timing in timings)

@@ -15,6 +15,7 @@ import numpy as np
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK
 from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.extraction import meet
 from brachis.optimise.improve import (
     SolvedProgram,
     SolverSession,
@@ -199,7 +200,7 @@ def improve_timings(
     unrestricted = solved.program.with_phases(
         phase.with_limits(original.limits) for phase, original in pairs
     )
-    timings = time_phases(unrestricted, solved.x)
+    timings = time_phases(unrestricted, meet(unrestricted, solved.x))
     if least_time(timings) < paths.t_end:
         return BetterTimings(unrestricted, timings, solved)
     return replace(unimproved, solved=solved)
