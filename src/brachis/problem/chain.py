@@ -7,6 +7,28 @@ from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
 from brachis.problem.problem import Problem
+from brachis.task import Mark
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a program, as a section of the path of its problem.
+
+    Attributes
+    ----------
+    name : str
+    kind : str
+        ``path``, ``move``, ``approach``, ``retract`` or ``dwell``.
+    s_end : float
+        Path coordinate at its end; that of the section before if it is a dwell.
+    marks : tuple of Mark
+        Its events.
+    """
+
+    name: str
+    kind: str
+    s_end: float
+    marks: tuple[Mark, ...]
 
 
 @dataclass(frozen=True, repr=False)
@@ -19,11 +41,14 @@ class ProblemChain(Problem):
     ----------
     chained : tuple of Problem
         The parts.
+    sections : tuple of tuple of Section
+        The parts of the program on each problem, in their order.
     is_closed : bool
         Whether the last part ends in the posture in which the first one begins.
     """
 
     chained: tuple[Problem, ...] = field(kw_only=True)
+    sections: tuple[tuple[Section, ...], ...] = field(kw_only=True)
     is_closed: bool = field(kw_only=True)
 
     @classmethod
@@ -32,6 +57,7 @@ class ProblemChain(Problem):
         whole: Problem,
         parts: Sequence[Problem],
         waits: Sequence[float],
+        sections: Sequence[Sequence[Section]],
         *,
         is_closed: bool,
     ) -> ProblemChain:
@@ -44,6 +70,7 @@ class ProblemChain(Problem):
         parts : sequence of Problem
         waits : sequence of float
             Time for which the arm waits after each part, s.
+        sections : sequence of sequence of Section
         is_closed : bool
         """
         waiting = tuple(
@@ -53,7 +80,12 @@ class ProblemChain(Problem):
         known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
         known["legs"] = tuple(leg for part in waiting for leg in part.legs)
         known["time_laws"] = tuple(law for part in parts for law in part.time_laws)
-        return cls(**known, chained=waiting, is_closed=is_closed)
+        return cls(
+            **known,
+            chained=waiting,
+            sections=tuple(map(tuple, sections)),
+            is_closed=is_closed,
+        )
 
     @property
     def parts(self) -> tuple[Problem, ...]:

@@ -19,14 +19,27 @@ from brachis.task.load import (
     read_assignment,
     with_keys,
 )
-from brachis.task.models import Posture, Task
+from brachis.task.models import Task
 from brachis.task.orientation import (
     AlongTangent,
     Rotate,
     ToolPose,
     TurnTo,
 )
+from brachis.task.paths import Posture
 from brachis.task.point_data import FitReport, FitTolerance, PointFile
+from brachis.task.program import (
+    ApproachPart,
+    DwellPart,
+    LimitedPart,
+    Mark,
+    MovePart,
+    PathPart,
+    PayloadPart,
+    RetractPart,
+    name_of,
+    path_keys,
+)
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
     CsvSegment,
@@ -50,20 +63,28 @@ __all__ = [
     "LIMIT_KINDS",
     "ROBOT_LIMITS",
     "AlongTangent",
+    "ApproachPart",
     "CsvSegment",
+    "DwellPart",
     "FitReport",
     "FitTolerance",
     "FrictionSettings",
     "LimitKeywords",
     "LimitSpec",
+    "LimitedPart",
     "LineBy",
     "LineSegment",
+    "Mark",
+    "MovePart",
+    "PathPart",
     "Payload",
+    "PayloadPart",
     "Placement",
     "PointFile",
     "Posture",
     "ProcessSpeed",
     "RefinementSettings",
+    "RetractPart",
     "RobotKeywords",
     "RobotSettings",
     "Rotate",
@@ -83,7 +104,9 @@ __all__ = [
     "fit_path",
     "json_schema",
     "load_task",
+    "name_of",
     "name_task_file",
+    "path_keys",
     "read_assignment",
     "read_limits",
     "task_with",

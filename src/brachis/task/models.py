@@ -8,40 +8,47 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from operator import attrgetter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
     JsonValue,
-    field_validator,
     model_validator,
 )
 
 from brachis.task.fields import (
     POSITION,
-    ByForm,
     CheckedModel,
     Flag,
     Mistake,
-    Model,
     Name,
-    NonEmpty,
-    Number,
-    Vector,
     Version,
     check_defined,
     must,
-    plain,
-    refuse,
 )
 from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import StartPlace, ToolPose
+from brachis.task.paths import (
+    FreePosture,
+    JointValues,
+    PathStart,
+    Posture,
+    RedundantJoints,
+    StatedPath,
+    split_path_in_frame,
+)
 from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
+from brachis.task.program import (
+    NEXT,
+    ProgramPart,
+    find_mistakes,
+    with_task_space,
+)
 from brachis.task.scene import CollisionSettings, SceneBody, SceneSource, name_bodies
-from brachis.task.segments import CsvSegment, Segment, SegmentModel, are_matrices
+from brachis.task.segments import CsvSegment
 from brachis.task.settings import (
     BoundarySettings,
     FramePlacement,
@@ -54,7 +61,6 @@ from brachis.task.settings import (
     expand_solver_name,
 )
 from brachis.task.tolerances import (
-    EACH_ONCE,
     Margins,
     OrientationTolerance,
     PositionTolerance,
@@ -62,42 +68,8 @@ from brachis.task.tolerances import (
     Tolerances,
 )
 
-JointValues = Annotated[
-    NonEmpty[Number] | Annotated[dict[Name, Number], Field(min_length=1)],
-    ByForm(
-        "a list of numbers in the order of the chain, or a mapping of joint names to numbers"
-    ),
-]
-
-
-class Posture(Model):
-    """A configuration of the robot."""
-
-    joints: JointValues
-    """Joint positions, rad (m), in the order of the chain or by joint name."""
-
-
-PathStart = Annotated[
-    StartPlace,
-    ByForm(
-        "a list of the rows of the task space, or for a pose a mapping {position: [x, y, z], rpy_deg: [...]}"
-    ),
-]
-FreePosture = Annotated[
-    Name | Posture,
-    ByForm("free, the name of a posture, or a mapping {joints: [...]}"),
-]
-
-
-RedundantJoints = Annotated[
-    Literal["auto"] | Annotated[tuple[Name, ...], EACH_ONCE],
-    ByForm("auto, or a list of joint names"),
-]
-
-
-Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
-
-
+_WORDS = {"free", "start", NEXT}
+"""Words that stand for postures that the planner chooses or knows."""
 _CHOICES = {
     "redundant_joints": "auto",
     "branch": "auto",
@@ -114,13 +86,6 @@ _OF_PATHS = {
     **_CHOICES,
 }
 """Keys of tasks with a path, and their defaults."""
-
-
-class PathInFrame(Model):
-    """A path that is given in a named frame."""
-
-    frame: Name
-    segments: Segments
 
 
 class Task(CheckedModel):
@@ -155,16 +120,19 @@ class Task(CheckedModel):
     axis), axis, joints (all joint positions; only the timing is planned), free (nothing: a move from the start posture
     to the end posture), or a list of rows: some of x, y, z, then one of yaw, pitch, roll (angle about the world's z, y
     or x axis, rad) or axis (direction of the tool's z axis)."""
-    path: Annotated[tuple[Segment, ...], Field(max_length=3000)] = ()
+    path: StatedPath = ()
     """List of segments; or a list of points, each with all task coordinates, for the spline through them. In a frame:
     {frame: NAME, segments: [...]}. A move (task_space: free) has none."""
+    program: tuple[ProgramPart, ...] = ()
+    """Parts that follow one another, in place of a path: {path: ...}, {move: ...}, {approach: ...}, {retract: ...},
+    {dwell: ...} or {payload: ...}. task_space is then that of the paths. end: start closes the motion."""
     frames: dict[Name, FramePlacement] = Field(default={})
     """Placements of frames, for example of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
         dict[Name, JointValues],
         must(
-            lambda named: "free" not in named,
-            "free cannot be the name of a posture",
+            lambda named: not {*named} & _WORDS,
+            "free, start and next cannot be names of postures",
             "different names",
         ),
     ] = Field(default={})
@@ -221,73 +189,17 @@ class Task(CheckedModel):
         """Give a joint path a free start by default, and split a path given in a frame."""
         if not isinstance(content, Mapping):
             return content
-        if content.get("task_space") == "joints":
+        if content.get("program"):
+            content = with_task_space(content)
+        elif content.get("task_space") == "joints":
             content = {"start": "free", **content}
-        path = content.get("path")
-        if not isinstance(path, Mapping) or "frame" not in path:
-            return content
-        if set(path) != {"frame", "segments"}:
-            raise refuse(
-                "a path in a frame needs the keys frame and segments",
-                key="path",
-                found=path,
-                allowed="{frame: NAME, segments: [...]}",
-            )
-        path_frame = content.get("path_frame")
-        if path_frame not in (None, path["frame"]):
-            raise refuse(
-                "this frame differs from path.frame",
-                key="path_frame",
-                found=path_frame,
-                allowed=f"{path['frame']}, or only one of the two keys",
-            )
-        return {**content, "path": path["segments"], "path_frame": path["frame"]}
-
-    @field_validator(
-        "path",
-        mode="before",
-        json_schema_input_type=Segments
-        | Segment
-        | Annotated[tuple[Vector, ...], Field(min_length=2)]
-        | PathInFrame,
-    )
-    @classmethod
-    def _points_and_one_segment_are_paths(cls, path: object) -> object:
-        if isinstance(path, SegmentModel | Mapping):
-            return (path,)
-        if path == ():  # not stated
-            return path
-
-        if callable(path):
-            raise refuse(
-                "a curve is not a segment",
-                found=path,
-                allowed="brachis.bspline_segment(curve, (first, last)), or the curve's points as an array",
-            )
-        rows = plain(path)
-        if not isinstance(rows, list) or any(
-            isinstance(row, SegmentModel | Mapping) for row in rows
-        ):
-            return path
-        if are_matrices(rows):
-            raise refuse(
-                "poses are not segments",
-                found=rows,
-                allowed="brachis.Spline(through=poses), or brachis.fit_path(poses)",
-            )
-        if len(rows) > 1 and all(isinstance(row, list) for row in rows):
-            return ({"spline": {"starts_at": rows[0], "through": rows[1:]}},)
-        if all(isinstance(row, list | int | float) for row in rows):
-            raise refuse(
-                "these numbers do not form a path" if rows else "there is no segment",
-                found=rows,
-                allowed="at least one segment, such as {line: {by: [0, 0.4, 0]}}, or two points or more, [[...], ...]",
-            )
-        return path
+        return split_path_in_frame(content)
 
     def joints_at(self, end: str) -> tuple[Any, str] | None:
         """Return the joint positions at ``start`` or ``end`` and their key, or None if the posture is free."""
         posture = getattr(self, end)
+        if posture == "start":
+            return self.joints_at("start")
         if isinstance(posture, Posture):
             return posture.joints, f"{end}.joints"
         if posture == "free":
@@ -312,6 +224,7 @@ class Task(CheckedModel):
         self._check_names()
         if self.task_space == "free":
             yield from self._changed(_OF_PATHS, "a move has no path")
+            yield from find_mistakes(self.program)
         elif self.path:
             yield from self._mistakes_at_the_start()
             yield from self._mistakes_in_the_path()
@@ -324,6 +237,10 @@ class Task(CheckedModel):
         """Refuse names of frames and postures that the task does not define."""
         frames = {"path_frame": self.path_frame}
         frames |= {f"scene[{i}].frame": body.frame for i, body in enumerate(self.scene)}
+        frames |= {
+            f"program[{i}].path_frame": getattr(part, "path_frame", None)
+            for i, part in enumerate(self.program)
+        }
         check_frames(self.frames, frames)
         postures = {
             f"path[{i}].line.to_posture": getattr(segment.shape, "to_posture", None)
@@ -331,7 +248,13 @@ class Task(CheckedModel):
         }
         check_defined("posture", postures, self.postures)
         ends = {"start": self.start, "end": self.end}
-        check_defined("posture", ends, ["free", *self.postures])
+        of_program = ["start"] if self.program else []
+        check_defined("posture", ends, ["free", *of_program, *self.postures])
+        moves = {
+            f"program[{i}].move": getattr(part, "move", None)
+            for i, part in enumerate(self.program)
+        }
+        check_defined("posture", moves, [NEXT, *self.postures])
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]

@@ -1,0 +1,217 @@
+"""The parts of a program, as the task file writes them.
+
+A program is a list of mappings such as ``- path: [...]`` and ``- move: home``. The parts follow one another without a
+gap; the arm stops between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from brachis.task.fields import (
+    ByForm,
+    ByKey,
+    Mistake,
+    Model,
+    Name,
+    Number,
+    Positive,
+)
+from brachis.task.limit_models import LimitSpec, ToolLimits
+from brachis.task.paths import (
+    PathStart,
+    Posture,
+    RedundantJoints,
+    StatedPath,
+    split_path_in_frame,
+)
+from brachis.task.settings import Payload
+from brachis.task.tolerances import TaskSpace, Tolerances
+
+_WAYS = ("path", "move", "approach", "retract")
+"""Kinds of parts in which the arm moves."""
+NEXT = "next"
+"""Word for the posture in which the next part begins best."""
+
+
+class Mark(Model):
+    """An event at the start or end of a part, such as the ignition of an arc."""
+
+    name: Name
+    """Name of the event."""
+    at: Literal["start", "end"] = "start"
+    """End of the part at which the event occurs."""
+    lead: Number = 0.0
+    """Time by which the event comes earlier, s; later if negative."""
+
+
+class Part(Model):
+    """A part of a program."""
+
+    kind: ClassVar[str]
+    name: Name | None = None
+    """Name of the part. Null: its kind and number."""
+    events: tuple[Mark, ...] = ()
+    """Events that are returned with their times."""
+
+
+class LimitedPart(Part):
+    """A part with limits of its own."""
+
+    tool_limits: ToolLimits | None = None
+    """Limits on the tool in this part. Null: those of the task."""
+    limits: LimitSpec | None = None
+    """Joint limits in this part. Null: those of the robot."""
+
+
+class PathPart(LimitedPart):
+    """A path of the tool."""
+
+    kind: ClassVar[str] = "path"
+    path: StatedPath
+    """As path of a task."""
+    task_space: TaskSpace | None = None
+    """As task_space of a task, which is the default."""
+    path_start: PathStart = None
+    """As path_start of a task. Null: the first waypoint, or the end of the part before."""
+    path_frame: Name | None = None
+    """As path_frame of a task."""
+    tolerances: Tolerances = Field(default_factory=Tolerances)
+    """As tolerances of a task."""
+    redundant_joints: RedundantJoints = "auto"
+    """As redundant_joints of a task."""
+    branch: Name = "auto"
+    """As branch of a task."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expand(cls, content: object) -> object:
+        """Split a path that is given in a frame."""
+        if not isinstance(content, Mapping):
+            return content
+        return split_path_in_frame(content)
+
+
+class MovePart(LimitedPart):
+    """A move through the air."""
+
+    kind: ClassVar[str] = "move"
+    move: Annotated[
+        Name | Posture,
+        ByForm("next, the name of a posture, or a mapping {joints: [...]}"),
+    ]
+    """Posture at the end: next (where the next part begins best), the name of a posture, or {joints: [...]}."""
+
+
+class ApproachPart(Part):
+    """A straight way to the start of the next path, along the tool's z axis."""
+
+    kind: ClassVar[str] = "approach"
+    approach: Positive
+    """Length, m."""
+
+
+class RetractPart(Part):
+    """A straight way back from the end of the path before, along the tool's z axis."""
+
+    kind: ClassVar[str] = "retract"
+    retract: Positive
+    """Length, m."""
+
+
+class DwellPart(Part):
+    """A wait at rest."""
+
+    kind: ClassVar[str] = "dwell"
+    dwell: Positive
+    """Duration, s."""
+
+
+class PayloadPart(Part):
+    """A change of the payload for all parts that follow."""
+
+    kind: ClassVar[str] = "payload"
+    payload: Payload | None
+    """As robot.payload of a task. Null: nothing."""
+
+
+ProgramPart = Annotated[
+    PathPart | MovePart | ApproachPart | RetractPart | DwellPart | PayloadPart,
+    ByKey("a part needs exactly one kind"),
+]
+
+
+def name_of(part: Part, number: int) -> str:
+    """Return the name of a part, whose number counts from 1."""
+    return part.name or f"{part.kind} {number}"
+
+
+def path_keys(part: PathPart) -> dict[str, Any]:
+    """Return the keys of a task for the path of a part."""
+    keys = (
+        "path",
+        "task_space",
+        "path_start",
+        "path_frame",
+        "tolerances",
+        "redundant_joints",
+        "branch",
+    )
+    return {key: getattr(part, key) for key in keys}
+
+
+def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a task with a program whose paths have the task space of the task by default.
+
+    The task itself is a move: its start may be free.
+    """
+    space = content.get("task_space")
+    parts = content["program"]
+    if isinstance(parts, Sequence) and not isinstance(parts, str):
+        parts = [
+            {"task_space": space, **part}
+            if isinstance(part, Mapping) and "path" in part
+            else part
+            for part in parts
+        ]
+    return {"start": "free", **content, "program": parts, "task_space": "free"}
+
+
+def find_mistakes(parts: Sequence[Part]) -> Iterator[Mistake]:
+    """Yield the mistakes in the order of a program's parts."""
+    kinds = [part.kind for part in parts if part.kind in _WAYS]
+    numbers = [i for i, part in enumerate(parts) if part.kind in _WAYS]
+    for number, before, kind, after in zip(
+        numbers, [None, *kinds], kinds, [*kinds[1:], None], strict=False
+    ):
+        key = f"program[{number}]"
+        part = parts[number]
+        if kind == "approach" and (after != "path" or before not in ("move", None)):
+            yield (
+                key,
+                "an approach leads to a path",
+                "a path after it, and a move or nothing before it",
+            )
+        if kind == "retract" and (before != "path" or after not in ("move", None)):
+            yield (
+                key,
+                "a retract leads away from a path",
+                "a path before it, and a move or nothing after it",
+            )
+        if isinstance(part, PathPart) and part.task_space in (None, "free"):
+            yield (
+                f"{key}.task_space",
+                "a path needs a task space",
+                "pose, position, ...; or task_space of the task, for all paths",
+            )
+        if isinstance(part, MovePart) and part.move == NEXT and after == "move":
+            yield (
+                f"{key}.move",
+                "two moves meet in a posture that nothing determines",
+                "a posture, or a path after the move",
+            )
+    if parts and not kinds:
+        yield "program", "nothing moves", "at least one path or move"
