@@ -33,6 +33,7 @@ from brachis.problem.plausibility import (
     of_task,
 )
 from brachis.problem.problem import Decompositions, Problem, decompositions_of
+from brachis.problem.program import bind_task
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
@@ -159,7 +160,7 @@ def plan(
             remarks = of_robot(robot) + of_task(loaded_task)
             remarks = report_issues(remarks, strict=loaded_task.strict)
             _report_plan(robot, loaded_task, report)
-            problem = Problem.of(robot, loaded_task, own_limits)
+            problem = bind_task(robot, loaded_task, own_limits)
             remarks += report_issues(of_places(problem), strict=loaded_task.strict)
             opening = partial(_open_search, families=families, report=report)
             search = search_motion(problem, robot, known, opening, deadline, report)
@@ -176,7 +177,7 @@ def plan(
             remarks += report_issues(end_time, strict=loaded_task.strict)
             motion = best if smoothed is None else smoothed
             gap = None
-            if not deadline.passed:
+            if not (deadline.passed or problem.is_chain):
                 gap = find_timing_gap(motion.trajectory, problem.limits)
             if gap is not None and not end_time:
                 slow = gap.issues()
@@ -234,7 +235,7 @@ def _find_smoother(
     best: FinishedCandidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
     """Find the smoothest motion that is as fast as the best one, if the task asks for it."""
-    if not problem.task.search.least_motion:
+    if problem.is_chain or not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
     smoothest = find_least_motion(best, deadline, report)

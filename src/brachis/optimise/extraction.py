@@ -51,7 +51,7 @@ def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Traject
     If the problem has several parts, the trajectory is that of a move, and has the trajectories of the parts as its
     components.
     """
-    if len(problem.parts) == 1:
+    if not problem.is_chain:
         return extract_trajectory(problem.task, program, x)
     motions = join_motions(program, x)
     components = []

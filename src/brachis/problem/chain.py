@@ -88,6 +88,11 @@ class ProblemChain(Problem):
         )
 
     @property
+    def is_chain(self) -> bool:
+        """True: the motion consists of the motions of the parts."""
+        return True
+
+    @property
     def parts(self) -> tuple[Problem, ...]:
         """The problems whose motions follow one another."""
         return self.chained

@@ -62,6 +62,8 @@ class Problem(Summary):
         Time law of each leg; None if its speed is free.
     own_limits : tuple of LimitModel
         Limits that are not in the task, as the user gave them.
+    beside : tuple of (E, n) ndarray or None
+        Postures from which the arm comes, and postures to which it goes on, if they are known.
     """
 
     task: Task
@@ -74,6 +76,7 @@ class Problem(Summary):
     legs: tuple[Leg, ...]
     time_laws: tuple[TimeLaw | None, ...]
     own_limits: tuple[LimitModel, ...] = ()
+    beside: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
 
     @classmethod
     def of(
@@ -126,6 +129,11 @@ class Problem(Summary):
         if end is not None and not task.boundary.periodic:
             end = _on_path(task_map, end, path)
         return replace(problem, limits=limits, end=end)
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether the motion consists of the motions of other problems."""
+        return False
 
     @property
     def parts(self) -> tuple[Problem, ...]:

@@ -258,6 +258,25 @@ def chart_guesses(
     deadline: Deadline = NEVER,
     listener: Listener = ignore,
 ) -> list[InitialGuess] | DeadEnd:
+    """Take the most promising of the joint paths that `joint_paths_in_charts` finds; see there.
+
+    Returns
+    -------
+    list of InitialGuess or DeadEnd
+        Improved guesses. Those with the least estimated times come first.
+    """
+    guesses = joint_paths_in_charts(problem, decompositions, level, deadline)
+    if isinstance(guesses, DeadEnd):
+        return guesses
+    return screen(guesses, level.in_charts, deadline, listener)
+
+
+def joint_paths_in_charts(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
+    level: SearchLevel,
+    deadline: Deadline = NEVER,
+) -> list[InitialGuess] | DeadEnd:
     """Take the shortest distinct joint paths from the lattice of all postures, each with a chart around it.
 
     Parameters
@@ -267,7 +286,6 @@ def chart_guesses(
         Their closed forms give the postures at the start if neither end is given.
     level : SearchLevel
     deadline : Deadline, optional
-    listener : callable, optional
 
     Returns
     -------
@@ -328,8 +346,7 @@ def chart_guesses(
     refuse_hopeless(guesses)
     # Joint paths whose estimated time is more than three times the least estimate are hopeless.
     longest = 3.0 * guesses[0].estimate
-    hopeful = [guess for guess in guesses if guess.estimate <= longest]
-    return screen(hopeful, level.in_charts, deadline, listener)
+    return [guess for guess in guesses if guess.estimate <= longest]
 
 
 def random_joint_paths(

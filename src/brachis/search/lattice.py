@@ -21,15 +21,15 @@ path is followed. With the first term alone, the time along a straight joint pat
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TypedDict
 
 import numpy as np
 
 from brachis.common.deadline import NEVER, Deadline
 from brachis.kernel import find_largest_products
-from brachis.limits import HasLatticeWeights
+from brachis.limits import HasLatticeWeights, Limit
 from brachis.problem.problem import Problem
 from brachis.robot.joints import TURN
 from brachis.search.joint_path import (
@@ -248,7 +248,7 @@ class Lattice(ABC):
                     layer = JUMPS
                 return DeadEnd(s, layer, backwards=self._backwards)
             layers.append(layer)
-        length = layers[-1].length
+        length = layers[-1].length + self._lengths_beside(layers[-1].q, -1)
         ends = np.argsort(length, kind="stable")
         if self._to_end:
             ends = ends[self._at_end(layers[-1])[ends]]
@@ -282,7 +282,10 @@ class Lattice(ABC):
         within = np.flatnonzero(inside.all(axis=1))
         if not len(within):
             return leaving_range(self._robot, inside)
-        return self._keep(layer[within], self._choose_start_nodes)
+        begun = self._keep(layer[within], self._choose_start_nodes)
+        if isinstance(begun, Layer):
+            begun = replace(begun, length=self._lengths_beside(begun.q, 0))
+        return begun
 
     def _next(
         self, before: Layer, station: int, rng: np.random.Generator
@@ -442,13 +445,38 @@ class Lattice(ABC):
         self, q: np.ndarray, step: np.ndarray, origin: np.ndarray
     ) -> np.ndarray:
         """Return the lengths, (E,), of steps, (E, n), from the postures q[origin], as the module defines them."""
-        lengths = np.zeros((2, len(step)))
-        for limit in self.problem.limits:
-            if not isinstance(limit, HasLatticeWeights):
-                continue
-            for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
-                if rows is not None:
-                    np.maximum(
-                        length, find_largest_products(rows, step, origin), out=length
-                    )
-        return lengths[0] + 0.5 * lengths[1]  # T = 0.5 s
+        by_acceleration, by_velocity = step_lengths(
+            self.problem.limits, q, step, origin
+        )
+        return by_acceleration + 0.5 * by_velocity  # T = 0.5 s
+
+    def _lengths_beside(self, q: np.ndarray, end: int) -> np.ndarray:
+        """Return the lengths, (K,), of the steps between postures and the closest posture beside the path, or zero."""
+        others = self.problem.beside[end]
+        if others is None:
+            return np.zeros(len(q))
+        origin = np.arange(len(q))
+        joints = others.shape[1]
+        lengths = []
+        for other in others:
+            step = np.zeros_like(q)
+            step[:, :joints] = self._step(q, np.append(other, q[0, joints:]))[
+                :, :joints
+            ]
+            lengths.append(self._lengths(q, step, origin))
+        return np.asarray(np.min(lengths, axis=0))
+
+
+def step_lengths(
+    limits: Sequence[Limit], q: np.ndarray, step: np.ndarray, origin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return max |A dq| and max |B dq|, (E,) each, of steps, (E, n), from the postures q[origin]; see the module."""
+    lengths = np.zeros((2, len(step)))
+    for limit in limits:
+        if not isinstance(limit, HasLatticeWeights):
+            continue
+        for length, rows in zip(lengths, limit.lattice_weights(q), strict=True):
+            if rows is not None:
+                products = find_largest_products(rows, step, origin)
+                np.maximum(length, products, out=length)
+    return lengths[0], lengths[1]

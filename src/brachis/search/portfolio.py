@@ -31,6 +31,7 @@ from brachis.errors import BrachisError, UnreachableError
 from brachis.optimise.backends import SolveStatus
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import pipeline
+from brachis.search.chain import chain_batches
 from brachis.search.failure import explain_first_failures, explain_no_motion
 from brachis.search.first_motion import LITTLE_TIME, find_first_motion_of
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
@@ -198,7 +199,8 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        for batch in batches(
+        find = chain_batches if self._problem.is_chain else batches
+        for batch in find(
             self._problem, self._decompositions, self._latest, self._listener
         ):
             for decomposition, dead_end in batch.lattices:

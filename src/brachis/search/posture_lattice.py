@@ -142,7 +142,9 @@ class PostureLattice(Lattice):
         q = layer.q
         if self._r > 1:
             scaled = q / self._size
-            q = q[np.unique([0, *farthest(scaled, scaled[:1], 11)])]
+            first = int(np.argmin(self._lengths_beside(q, 0)))
+            others = farthest(scaled, scaled[[first]], 11)
+            q = q[np.unique([first, *others])]
             return Layer.start(q, np.arange(len(q)))
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components

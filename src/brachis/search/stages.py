@@ -167,6 +167,10 @@ class ChainGuess(InitialGuess):
         estimate = time + self.problem.dwell_time
         return replace(self, parts=tuple(parts), estimate=estimate, is_improved=True)
 
+    def postures_at(self, s: np.ndarray) -> np.ndarray:
+        """Return the postures of all parts side by side, (S, sum of n), at path coordinates, (S,), of each part."""
+        return np.hstack([part.postures_at(s) for part in self.parts])
+
     @property
     def in_chart(self) -> bool:
         """False: no chart is laid anew for the whole."""
