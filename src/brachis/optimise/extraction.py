@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
 from brachis.optimise.links import CurveLink
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
+from brachis.problem.chain import ProblemChain, Section
 from brachis.problem.problem import Problem
 from brachis.task import Task
 from brachis.trajectory import (
     CONTINUOUS_TORQUE,
     Component,
+    Event,
+    MotionPart,
     PhaseSpline,
     Trajectory,
     join_splines,
@@ -63,7 +67,41 @@ def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Traject
         components.append(Component(begin, trajectory))
         begin += trajectory.t_end + part.legs[-1].dwell
         first = legs.stop
-    return _compose(problem, components, begin)
+    composed = _compose(problem, components, begin)
+    sections = list(_time_sections(problem, components, begin))
+    events = [
+        Event(mark.name, (part.begin if mark.at == "start" else part.end) - mark.lead)
+        for section, part in sections
+        for mark in section.marks
+    ]
+    return replace(
+        composed,
+        parts=tuple(part for _, part in sections),
+        events=tuple(sorted(events, key=lambda event: event.time)),
+    )
+
+
+def _time_sections(
+    problem: Problem, components: Sequence[Component], end: float
+) -> Iterator[tuple[Section, MotionPart]]:
+    """Yield the sections of all parts of a problem, with their times."""
+    assert isinstance(problem, ProblemChain)
+    ends = [*(component.begin for component in components[1:]), end]
+    triples = zip(problem.sections, components, ends, strict=True)
+    for sections, component, last_end in triples:
+        begin = component.begin
+        for number, section in enumerate(sections):
+            reached = [
+                phase.end
+                for phase in component.trajectory.phases
+                if abs(phase.s_end - section.s_end) < tolerances.PATH
+                and (section.kind == "dwell" or not phase.is_dwell)
+            ]
+            section_end = component.begin + max(reached)
+            if section.kind == "dwell" and number == len(sections) - 1:
+                section_end = last_end
+            yield section, MotionPart(section.name, section.kind, begin, section_end)
+            begin = section_end
 
 
 def _compose(

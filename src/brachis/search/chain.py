@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from brachis import ik
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, TaskError
 from brachis.optimise.backends import solvers_for
 from brachis.problem.chain import ProblemChain
-from brachis.problem.problem import Decompositions, Problem
+from brachis.problem.problem import Decomposition, Decompositions, Problem
 from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_charts
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import step_lengths
@@ -30,8 +30,6 @@ _SHARE = 0.4
 """Fraction of the remaining time in which the joint paths of all paths are sought."""
 _SCREENED = 3
 """Number of chains that are improved for each one that is kept."""
-_SAME = 1e-6
-"""Difference of two postures below which they are the same, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +59,13 @@ class _Chain:
     time: float = 0.0
 
 
-def chain_batches(
-    problem: ProblemChain,
-    decompositions: Decompositions,
+def find_batches(
+    problem: Problem,
+    decompositions: Sequence[Decomposition],
     deadline: Deadline,
     listener: Listener,
 ) -> Iterator[Batch]:
-    """Yield the guesses of a program; see `brachis.search.schedule.batches`.
+    """Yield the guesses of a task or of a program; see `brachis.search.schedule.batches`.
 
     Raises
     ------
@@ -76,14 +74,16 @@ def chain_batches(
     TaskError
         Nothing determines the posture in which the program begins.
     """
+    if not isinstance(problem, ProblemChain):
+        yield from batches(problem, decompositions, deadline, listener)
+        return
     level = SEARCH_LEVELS[problem.task.search.effort][0]
-    search = _ChainSearch(
-        problem, decompositions, level, deadline.part(_SHARE), listener
-    )
-    chains = search.best_chains()[: _SCREENED * level.in_charts]
-    guesses = [search.guess(chain) for chain in chains]
+    families = getattr(decompositions, "families", ())
+    search = _ChainSearch(problem, families, level, deadline.part(_SHARE), listener)
     first, *others = solvers_for(problem.task.solver.name)
-    guesses = [replace(guess, solver=first.name) for guess in guesses]
+    guesses: list[InitialGuess] = [
+        replace(guess, solver=first.name) for guess in search.best_guesses()
+    ]
     guesses = screen(guesses, level.in_charts, deadline, listener)
     yield Batch(guesses, level.refined, fallback=False)
     for solver in others:
@@ -96,59 +96,64 @@ class _ChainSearch:
     """A search over the parts of a program; see `chain_batches`."""
 
     problem: ProblemChain
-    decompositions: Decompositions
+    families: Sequence[ik.Family]
     level: SearchLevel
     deadline: Deadline
     listener: Listener
 
-    @cached_property
-    def _joints(self) -> int:
-        """Number of joints of the robot without virtual joints."""
-        return self.problem.robot.n
-
-    def best_chains(self) -> list[_Chain]:
-        """Return chains of options for all parts, the fastest first."""
+    def best_guesses(self) -> list[ChainGuess]:
+        """Return guesses of the whole program, the fastest first."""
         parts = self.problem.parts
         start = self.problem.start
-        if start is None and not parts[0].task_map.m:
+        first = 0
+        if start is not None:
+            chains = [_Chain((_Option(np.array([start, start])),))]
+        elif self.problem.is_closed or parts[0].task_map.m:
+            # A motion that closes may be searched from any path on.
+            first = next(i for i, part in enumerate(parts) if part.task_map.m)
+            chains = [_Chain()]
+        else:
             raise TaskError(
                 "nothing determines the posture in which the program begins",
                 where="start",
                 found="free, before a move",
-                allowed="a posture",
+                allowed="a posture; or end: start, for a motion that closes",
             )
-        chains = [_Chain()]
-        if start is not None:
-            chains = [_Chain((_Option(np.array([start, start])),))]
-        return self._extend(chains, 0)
+        order = [*range(first, len(parts)), *range(first)]
+        chains = self._extend(chains, order)
+        chains = sorted(chains, key=lambda chain: chain.time)
+        return [
+            self._guess(chain, order)
+            for chain in chains[: _SCREENED * self.level.in_charts]
+        ]
 
-    def _extend(self, chains: list[_Chain], number: int) -> list[_Chain]:
-        """Continue chains with the parts from a number on."""
-        parts = self.problem.parts
-        if number == len(parts):
-            return sorted(chains, key=lambda chain: chain.time)
-        part = parts[number]
+    def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
+        """Continue chains with parts, given by their numbers."""
+        if not order:
+            return chains
+        number, *others = order
+        part = self.problem.parts[number]
         if part.task_map.m:
-            return self._extend(self._through(chains, part, number), number + 1)
+            return self._extend(self._through(chains, number), others)
         if part.end is not None:
             goal = _Option(np.array([part.end, part.end]))
-            return self._extend(self._move(chains, part, [goal]), number + 1)
-        after = parts[number + 1]
-        options = self._options(after, number + 1, chains)
-        moved = self._move(chains, part, options)
-        return self._extend(moved, number + 2)
+            return self._extend(self._move(chains, part, [goal]), others)
+        if others:
+            options = self._options(others[0], chains)
+            return self._extend(self._move(chains, part, options), others[1:])
+        # The last move leads to where the motion began.
+        closed = []
+        for chain in chains:
+            goal = _Option(chain.options[0].ends[[0, 0]])
+            closed += self._move([chain], part, [goal])
+        return closed
 
-    def _through(
-        self, chains: list[_Chain], part: Problem, number: int
-    ) -> list[_Chain]:
+    def _through(self, chains: list[_Chain], number: int) -> list[_Chain]:
         """Continue chains with a path that begins where they end."""
         longer = []
         for chain in chains:
             start = chain.options[-1].ends[-1] if chain.options else None
-            begun = part if start is None else replace(part, start=start)
-            for option in self._options(begun, number, [chain]):
-                guess = option.guess and replace(option.guess, problem=part)
-                option = replace(option, guess=guess)
+            for option in self._options(number, [chain], start):
                 time = chain.time + option.time
                 longer.append(_Chain((*chain.options, option), time))
         return longer
@@ -162,18 +167,27 @@ class _ChainSearch:
         for option in options:
             prices = price_moves(part, begins, option.ends[0])
             times = prices + [chain.time for chain in chains]
-            for best in np.argsort(times, kind="stable")[: self.level.in_charts]:
+            count = self.level.in_charts * (_SCREENED if len(options) == 1 else 1)
+            for best in np.argsort(times, kind="stable")[:count]:
                 chain = chains[best]
                 time = float(times[best]) + option.time
                 longer.append(_Chain((*chain.options, option), time))
         return longer
 
     def _options(
-        self, part: Problem, number: int, chains: Sequence[_Chain]
+        self,
+        number: int,
+        chains: Sequence[_Chain],
+        start: np.ndarray | None = None,
     ) -> list[_Option]:
-        """Find joint paths of a path, close to the postures where chains end and to a given posture after it."""
-        name = self.problem.sections[number][0].name
-        self.listener(f"looking for joint paths of {name}")
+        """Find joint paths of a path, close to the postures where chains end and to a given posture after it.
+
+        With a start posture, all begin there.
+        """
+        part = self.problem.parts[number]
+        self.listener(
+            f"looking for joint paths of {self.problem.sections[number][0].name}"
+        )
         before = [chain.options[-1].ends[-1] for chain in chains if chain.options]
         after = None
         if number + 1 < len(self.problem.parts):
@@ -182,19 +196,22 @@ class _ChainSearch:
             np.unique(before, axis=0) if before else None,
             None if after is None else after[None],
         )
-        guesses = self._guesses(replace(part, beside=beside))
+        changed = replace(
+            part, beside=beside, start=part.start if start is None else start
+        )
+        guesses = self._guesses(changed)
         return [
             _Option(
-                guess.postures_at(np.array([0.0, 1.0]))[:, : self._joints],
+                guess.postures_at(np.array([0.0, 1.0]))[:, : self.problem.robot.n],
                 guess.estimate,
-                replace(guess, problem=replace(part, beside=(None, None))),
+                replace(guess, problem=part),
             )
             for guess in guesses
         ]
 
     def _guesses(self, part: Problem) -> list[InitialGuess]:
         """Find joint paths of a path."""
-        own = Decompositions(part, self.decompositions.families)
+        own = Decompositions(part, self.families)
         if has_charts(part, own):
             found = joint_paths_in_charts(part, own, self.level, self.deadline)
             if not isinstance(found, DeadEnd):
@@ -204,25 +221,26 @@ class _ChainSearch:
                 return list(batch.guesses)
         raise PathError("no joint path was found", where="program")
 
-    def guess(self, chain: _Chain) -> ChainGuess:
+    def _guess(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
         """Return the guess of a chain, with straight joint lines as moves."""
         options = list(chain.options)
-        here = options.pop(0).ends[-1] if self.problem.start is not None else None
-        guesses = []
-        for part in self.problem.parts:
+        guesses: dict[int, InitialGuess] = {}
+        here = None if self.problem.start is None else options.pop(0).ends[-1]
+        for number in order:
+            part = self.problem.parts[number]
+            option = options[0]
             if part.task_map.m:
-                option = options.pop(0)
-                guess = option.guess
-                assert guess is not None
+                assert option.guess is not None
+                guesses[number] = option.guess
             else:
                 assert here is not None
-                option = options[0]
-                if option.guess is None:
-                    options.pop(0)
-                guess = guess_along(part, np.array([here, option.ends[0]]), "line")
-            guesses.append(guess)
+                postures = np.array([here, option.ends[0]])
+                guesses[number] = guess_along(part, postures, "line")
+            if part.task_map.m or option.guess is None:
+                options.pop(0)
             here = option.ends[-1] if part.task_map.m else option.ends[0]
-        return ChainGuess.of_parts(self.problem, guesses, chain.time)
+        in_order = [guesses[number] for number in sorted(guesses)]
+        return ChainGuess.of_parts(self.problem, in_order, chain.time)
 
 
 def price_moves(part: Problem, begins: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -455,16 +455,15 @@ class Lattice(ABC):
         others = self.problem.beside[end]
         if others is None:
             return np.zeros(len(q))
-        origin = np.arange(len(q))
+        count = len(others)
+        origin = np.repeat(np.arange(len(q)), count)
+        # Virtual joints are not in postures beside the path.
         joints = others.shape[1]
-        lengths = []
-        for other in others:
-            step = np.zeros_like(q)
-            step[:, :joints] = self._step(q, np.append(other, q[0, joints:]))[
-                :, :joints
-            ]
-            lengths.append(self._lengths(q, step, origin))
-        return np.asarray(np.min(lengths, axis=0))
+        there = q[origin]
+        there[:, :joints] = np.tile(others, (len(q), 1))
+        step = self._step(q[origin], there)
+        lengths = self._lengths(q, step, origin).reshape(len(q), count)
+        return np.asarray(lengths.min(axis=1))
 
 
 def step_lengths(

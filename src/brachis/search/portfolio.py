@@ -31,7 +31,7 @@ from brachis.errors import BrachisError, UnreachableError
 from brachis.optimise.backends import SolveStatus
 from brachis.problem.problem import Decomposition, Problem
 from brachis.search import pipeline
-from brachis.search.chain import chain_batches
+from brachis.search.chain import find_batches
 from brachis.search.failure import explain_first_failures, explain_no_motion
 from brachis.search.first_motion import LITTLE_TIME, find_first_motion_of
 from brachis.search.given_motion import EXACT, GIVEN, given_guess
@@ -39,7 +39,7 @@ from brachis.search.holding import explain_holding, explain_postures
 from brachis.search.hopeless import explain_speeds
 from brachis.search.joint_path import ALL_POSTURES, NO_TIME, DeadEnd
 from brachis.search.processes import process_count, run_in_processes
-from brachis.search.schedule import Batch, batches
+from brachis.search.schedule import Batch
 from brachis.search.screening import is_same
 from brachis.search.stages import (
     NOT_TRIED,
@@ -199,8 +199,7 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        find = chain_batches if self._problem.is_chain else batches
-        for batch in find(
+        for batch in find_batches(
             self._problem, self._decompositions, self._latest, self._listener
         ):
             for decomposition, dead_end in batch.lattices:

@@ -89,6 +89,11 @@ class Check:
             object.__setattr__(self, "time", float(self.time))
         object.__setattr__(self, "passed", bool(self.value <= self.allowed))
 
+    @property
+    def share(self) -> float:
+        """The worst value as a fraction of the allowed one."""
+        return self.value / self.allowed if self.allowed else self.value
+
     def figures(self, *, degrees: bool) -> tuple[str, str, str]:
         """Write the value found, the allowed value, and their unit. Ratios to a limit are written with six decimals.
 

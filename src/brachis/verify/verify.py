@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace, RowsAndAngle
 from brachis.robot.urdf_bodies import turns_about
-from brachis.trajectory import MotionSource, motion_of
+from brachis.trajectory import MotionSource, Trajectory, motion_of
 from brachis.verify.checks import (
     check_continuity,
     check_ends,
@@ -98,6 +99,8 @@ def verify_trajectory(
     motion = CheckedMotion(
         trajectory, robot, task_map, path_of(task_map, task), options
     )
+    if trajectory.components:
+        return _verify_program(motion, own_limits)
     # The motion is processed in parts, because the placements of all joints take up much memory.
     surveys = [
         (
@@ -136,6 +139,73 @@ def verify_trajectory(
     return Verification(
         tuple(checks), len(motion.states.t), worst, path_check.value, tuple(least)
     )
+
+
+def _verify_program(
+    motion: CheckedMotion, own_limits: Sequence[LimitModel]
+) -> Verification:
+    """Verify the motion of a program: every component by itself, and the motion as a whole at their ends.
+
+    Of each check of the components, the worst is returned, with the name of its part.
+    """
+    trajectory = motion.trajectory
+    worst: dict[str, Check] = {}
+    verified = []
+    for component in trajectory.components:
+        part = verify_trajectory(
+            component.trajectory, motion.options, own_limits=own_limits
+        )
+        verified.append(part)
+        for check in part.checks:
+            before = worst.get(check.name)
+            if before is None or check.share > before.share:
+                worst[check.name] = _within(trajectory, component.begin, check)
+    whole = [
+        _check_components(motion),
+        *check_progress(motion),
+        *check_ends(motion),
+        *check_continuity(motion),
+    ]
+    whole += _check_closure(motion)
+    checks = worst | {check.name: check for check in whole}
+    return Verification(
+        tuple(checks.values()),
+        sum(part.points for part in verified),
+        max(part.worst_ratio for part in verified),
+        max(part.path_error for part in verified),
+    )
+
+
+def _within(trajectory: Trajectory, begin: float, check: Check) -> Check:
+    """Return a check of a component that begins at a time, s, with its time in the whole motion and its part."""
+    time = begin + (check.time or 0.0)
+    name = next(part.name for part in trajectory.parts if part.end >= time)
+    subject = f"{check.subject}, {name}" if check.subject else name
+    return replace(check, time=time, subject=subject)
+
+
+def _check_components(motion: CheckedMotion) -> Check:
+    """Check that the whole motion is that of its components, and at rest between them."""
+    trajectory = motion.trajectory
+    misses = []
+    for component in trajectory.components:
+        part = component.trajectory
+        joints = trajectory.position(component.begin + part.times)
+        misses.append(np.abs(joints - part.q[:, : joints.shape[1]]).max())
+    allowed = motion.options.posture_tolerance
+    return Check("motion of the parts", max(misses), allowed, "rad, m")
+
+
+def _check_closure(motion: CheckedMotion) -> list[Check]:
+    """Check that a motion that closes ends in the posture in which it begins."""
+    if motion.task.end != "start":
+        return []
+    first, last = motion.trajectory.q[[0, -1]]
+    joint = int(np.argmax(np.abs(last - first)))
+    allowed = motion.options.posture_tolerance
+    miss = abs(last - first)[joint]
+    subject = motion.robot.joint_names[joint]
+    return [Check("closure", miss, allowed, "rad, m", subject)]
 
 
 def path_errors(
