@@ -62,6 +62,8 @@ def explain_motion(
         costs = sensitivities_at(program, multipliers)
         lagrangian = lagrangian_of(program, multipliers)
         answer = OptimalMotion(problem, program, x, lagrangian)
+    if problem.is_chain:
+        return replace(costs, limits=_merge_figures(costs.limits, 1.0))
     time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
     figures = (*figure_sensitivities(answer), *costs.limits)
     limits = _merge_figures(figures, time_ratio)

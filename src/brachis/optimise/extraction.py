@@ -136,6 +136,9 @@ def _compose(
             nodes.append(_stand_still(nodes[-1], wait))
     joined = join_nodes(nodes)
     knots, control_points = join_splines(splines)
+    # Sums of durations differ from the times of the nodes by rounding.
+    phase_ends = np.cumsum([spline.t_end for spline in splines])
+    nearest = np.abs(joined.times[:, None] - phase_ends).argmin(axis=0)
     first = components[0].trajectory
     return Trajectory(
         task=problem.task,
@@ -151,7 +154,7 @@ def _compose(
         knots=knots,
         degree=splines[0].degree,
         control_points=control_points,
-        phase_ends=np.cumsum([spline.t_end for spline in splines]),
+        phase_ends=joined.times[nearest],
         chart_rows=np.empty((0, 0, 0)),
         chart_knots=np.empty(0),
         own_limits=first.own_limits,

@@ -31,6 +31,7 @@ from brachis.task import load_task
 from brachis.task.fields import LARGEST, Model
 from brachis.task.messages import task_error
 from brachis.trajectory.phases import find_phase_knots
+from brachis.trajectory.program import Event, MotionPart
 from brachis.trajectory.recovered import Recovered, StoredRecovery
 from brachis.trajectory.sensitivities import Sensitivities
 
@@ -71,6 +72,22 @@ _BROKEN = (
 """Errors raised when an archive, an array header or JSON is broken."""
 
 
+class _StoredPart(Model, strict=True):
+    """Name, kind and times, s, of a part of a program."""
+
+    name: str
+    kind: str
+    begin: float
+    end: float
+
+
+class _StoredEvent(Model, strict=True):
+    """Name and time, s, of an event."""
+
+    name: str
+    time: float
+
+
 class _Meta(Model, extra="ignore", strict=True):
     """Content of a result file, except its arrays."""
 
@@ -83,6 +100,10 @@ class _Meta(Model, extra="ignore", strict=True):
     recovered: StoredRecovery | None = None
     own_limits: list[str] = Field(default_factory=list)
     sensitivities: dict[str, Any] | None = None
+    begin: float = 0.0
+    parts: list[_StoredPart] = Field(default_factory=list)
+    events: list[_StoredEvent] = Field(default_factory=list)
+    components: list[_Meta] = Field(default_factory=list)
 
 
 def write_result(
@@ -173,7 +194,10 @@ def _read_parts(stream: BinaryIO) -> tuple[dict[str, Any], dict[str, np.ndarray]
         if not isinstance(meta, dict):
             raise TypeError("the metadata are not a mapping")
         ours = meta.get("schema") == SCHEMA
-        arrays = {name: archive[name] for name in ARRAYS if ours}
+        names = [*ARRAYS]
+        for number in range(len(meta.get("components", ()))):
+            names += [f"{number}.{name}" for name in ARRAYS]
+        arrays = {name: archive[name] for name in names if ours}
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):  # a member without the suffix .npy
             raise TypeError(f"{name} is not an array")
@@ -212,6 +236,10 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
             f"numbers between -{LARGEST:g} and {LARGEST:g}",
         )
     arrays = {name: array.astype(float) for name, array in arrays.items()}
+    components = []
+    for number, part in enumerate(meta.components):
+        inner = {name: arrays.pop(f"{number}.{name}") for name in ARRAYS}
+        components.append((part.begin, _check_parts(part, inner)))
     r = _redundancy(
         arrays["chart_rows"], arrays["chart_knots"], robot.n, len(redundant)
     )
@@ -228,6 +256,9 @@ def _check_parts(meta: _Meta, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         "own_limits": tuple(meta.own_limits),
         "sensitivities": meta.sensitivities
         and Sensitivities.of_file(meta.sensitivities),
+        "parts": tuple(MotionPart(**vars(part)) for part in meta.parts),
+        "events": tuple(Event(**vars(event)) for event in meta.events),
+        "components": components,
         **arrays,
     }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, wraps
 from itertools import pairwise
 from pathlib import Path
@@ -375,6 +375,16 @@ class Trajectory(Summary):
             The suffix is not npz, the folder does not exist or cannot be written to, or the file exists and is not a
             result.
         """
+        write_result(path, *self.contents())
+
+    def contents(self) -> tuple[dict[str, object], dict[str, np.ndarray]]:
+        """Return the data of a result file: the metadata, and the arrays, also those of the components."""
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        components = []
+        for place, component in enumerate(self.components):
+            meta, inner = component.trajectory.contents()
+            components.append({"begin": component.begin, **meta})
+            arrays |= {f"{place}.{name}": inner[name] for name in ARRAYS}
         meta = {
             "task": self.task.to_dict(),
             "urdf": self.urdf,
@@ -385,8 +395,11 @@ class Trajectory(Summary):
             "recovered": self.recovered and self.recovered.to_file(),
             "own_limits": self.own_limits,
             "sensitivities": self.sensitivities and self.sensitivities.to_file(),
+            "parts": [asdict(part) for part in self.parts],
+            "events": [asdict(event) for event in self.events],
+            "components": components,
         }
-        write_result(path, meta, {name: getattr(self, name) for name in ARRAYS})
+        return meta, arrays
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
@@ -397,7 +410,11 @@ class Trajectory(Summary):
         ResultFileError
             The file is missing, is broken or has an unknown schema version, or its parts do not fit each other.
         """
-        return cls(**read_result(file_name(path, "path")))
+        contents = read_result(file_name(path, "path"))
+        components = tuple(
+            Component(begin, cls(**parts)) for begin, parts in contents["components"]
+        )
+        return cls(**contents | {"components": components})
 
     def _check_times(self, t: ArrayLike) -> np.ndarray:
         """Raise an error for times outside the trajectory, except for rounding at its ends."""
