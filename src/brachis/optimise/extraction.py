@@ -19,7 +19,6 @@ from brachis.problem.problem import Problem
 from brachis.task import Task
 from brachis.trajectory import (
     CONTINUOUS_TORQUE,
-    Component,
     Event,
     MotionPart,
     PhaseSpline,
@@ -64,7 +63,7 @@ def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Traject
     for part in problem.parts:
         legs = slice(first, first + len(part.legs))
         trajectory = make_trajectory(part.task, program.phases[legs], motions[legs])
-        components.append(Component(begin, trajectory))
+        components.append((begin, trajectory))
         begin += trajectory.t_end + part.legs[-1].dwell
         first = legs.stop
     composed = _compose(problem, components, begin)
@@ -82,22 +81,22 @@ def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Traject
 
 
 def _time_sections(
-    problem: Problem, components: Sequence[Component], end: float
+    problem: Problem, components: Sequence[tuple[float, Trajectory]], end: float
 ) -> Iterator[tuple[Section, MotionPart]]:
     """Yield the sections of all parts of a problem, with their times."""
     assert isinstance(problem, ProblemChain)
-    ends = [*(component.begin for component in components[1:]), end]
+    ends = [*(begin for begin, _ in components[1:]), end]
     triples = zip(problem.sections, components, ends, strict=True)
-    for sections, component, last_end in triples:
-        begin = component.begin
+    for sections, (first, component), last_end in triples:
+        begin = first
         for number, section in enumerate(sections):
             reached = [
                 phase.end
-                for phase in component.trajectory.phases
+                for phase in component.phases
                 if abs(phase.s_end - section.s_end) < tolerances.PATH
                 and (section.kind == "dwell" or not phase.is_dwell)
             ]
-            section_end = component.begin + max(reached)
+            section_end = first + max(reached)
             if section.kind == "dwell" and number == len(sections) - 1:
                 section_end = last_end
             yield section, MotionPart(section.name, section.kind, begin, section_end)
@@ -105,7 +104,7 @@ def _time_sections(
 
 
 def _compose(
-    problem: Problem, components: Sequence[Component], end: float
+    problem: Problem, components: Sequence[tuple[float, Trajectory]], end: float
 ) -> Trajectory:
     """Join components, with a wait after each that does not end when the next one begins, to the motion of a move.
 
@@ -113,11 +112,10 @@ def _compose(
     """
     robot = problem.robot
     count = len(components)
-    begins = [component.begin for component in components]
+    ends = [*(begin for begin, _ in components[1:]), end]
     splines: list[PhaseSpline] = []
     nodes: list[Nodes] = []
-    for number, component in enumerate(components):
-        trajectory = component.trajectory
+    for number, (begin, trajectory) in enumerate(components):
         motion = (
             trajectory.q,
             trajectory.qdot,
@@ -130,7 +128,7 @@ def _compose(
         for spline in trajectory.phase_splines:
             s = (number + spline.control_points[:1]) / count
             splines.append(replace(spline, control_points=s))
-        wait = ([*begins, end])[number + 1] - component.end
+        wait = ends[number] - (begin + trajectory.t_end)
         if wait > 0.0:
             splines.append(splines[-1].wait(wait))
             nodes.append(_stand_still(nodes[-1], wait))
@@ -139,7 +137,7 @@ def _compose(
     # Sums of durations differ from the times of the nodes by rounding.
     phase_ends = np.cumsum([spline.t_end for spline in splines])
     nearest = np.abs(joined.times[:, None] - phase_ends).argmin(axis=0)
-    first = components[0].trajectory
+    first = components[0][1]
     return Trajectory(
         task=problem.task,
         urdf=first.urdf,

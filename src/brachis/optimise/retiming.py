@@ -15,11 +15,8 @@ from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
-from brachis.optimise.path_program import (
-    PathPhase,
-    PathProgram,
-    violation_of_postures,
-)
+from brachis.optimise.path_phase import PathPhase, violation_of_postures
+from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out

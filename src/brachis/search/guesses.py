@@ -31,11 +31,11 @@ from brachis.search.joint_path import (
     NO_TIME,
     DeadEnd,
     PosturePath,
-    sampling_box,
 )
 from brachis.search.lattice import LARGEST_STEP
 from brachis.search.phase_plane import fastest_times, least_time
 from brachis.search.posture_lattice import PostureLattice
+from brachis.search.random_paths import NEARLY, random_joint_paths
 from brachis.search.screening import screen
 from brachis.search.stages import InitialGuess
 from brachis.search.stations import spread_stations
@@ -88,22 +88,8 @@ _LATTICE_SHARE = 0.5
 """Fraction of the remaining time after which the lattice is abandoned, and only random joint paths are tried."""
 _RANDOM = 4
 """Number of random joint paths for each joint path that a level plans."""
-_RANDOM_STATIONS = 97
-"""Approximate number of stations along a random joint path. In 14 tasks, 81 % of the drawn postures reach the end, the
-same as with 385 stations; with 13 stations 78 % do."""
-_DRAWN = 8
-"""Number of postures drawn for each random joint path: on average over 14 tasks 81 % reach the end, and 14 % in the
-worst task."""
-_DRIFT = 2.0
-"""Maximum standard deviation of a drift, rad or m, in the scales of the joints; it displaces the end by half as much.
-
-On average over 14 tasks, the best of 16 joint paths is 0.5 % slower than with the best of the drifts 1, 2, 4 and 8 for
-the same task. With other drifts, it is 0.8 to 1.1 % slower, although larger drifts lead to more distinct joint paths.
-"""
 _LOOKED_AT = 4
 """Number of joint paths that are examined for each joint path that is chosen, if several joints are redundant."""
-_NEARLY = 0.2
-"""Maximum violation of a limit at rest with which a joint path still counts as a guess."""
 _SINGLE = SearchLevel(1, 1, 0, in_charts=1, in_closed_forms=1, refined=1)
 _FAST = SearchLevel(6, 4, 0, in_charts=4, in_closed_forms=24, refined=4)
 _THOROUGH = SearchLevel(
@@ -243,7 +229,7 @@ def numeric_guesses(
     for number, joint_path in enumerate(joint_paths, 1):
         q = joint_map.postures(joint_path)
         q = q[np.isfinite(q).all(axis=1)]
-        if all(limit.holds_at_rest(q, _NEARLY).all() for limit in scene):
+        if all(limit.holds_at_rest(q, NEARLY).all() for limit in scene):
             origin = f"numeric {number}"
             guesses.append(
                 InitialGuess(problem, joint_map, joint_path, np.inf, origin, family)
@@ -347,64 +333,6 @@ def joint_paths_in_charts(
     # Joint paths whose estimated time is more than three times the least estimate are hopeless.
     longest = 3.0 * guesses[0].estimate
     return [guess for guess in guesses if guess.estimate <= longest]
-
-
-def random_joint_paths(
-    problem: Problem, count: int, deadline: Deadline = NEVER
-) -> list[PosturePath]:
-    """Carry random postures, or a given one, along the path, each with a random drift.
-
-    Parameters
-    ----------
-    problem : Problem
-    count : int
-        Maximum number of joint paths to find.
-    deadline : Deadline, optional
-        The list is empty if this time passes.
-
-    Returns
-    -------
-    list of PosturePath
-        Joint paths between the given ends, within the joint ranges. Limits at rest may be exceeded by 20 %.
-    """
-    rng = np.random.default_rng(problem.task.search.seed)
-    newton = Newton(problem.task_map)
-    limits = problem.robot.limits
-    s = spread_stations(problem, _RANDOM_STATIONS)
-    is_backwards = problem.start is None and problem.end is not None
-    step = -1 if is_backwards else 1
-    ends = [problem.start, problem.end][::step]
-    targets = problem.path.sample(s).target[::step]
-    draws = _DRAWN * count
-    q = rng.uniform(*sampling_box(problem.robot), (draws, problem.robot.n))
-    if ends[0] is not None:
-        q[:] = ends[0]
-    drift = rng.normal(0.0, 1.0, q.shape) * rng.uniform(0.0, _DRIFT, (draws, 1))
-    drift *= newton.scales
-    paths = np.empty((draws, 0, problem.robot.n))
-    remaining = 1.0
-    lengths = np.append(0.0, np.abs(np.diff(s[::step])))
-    for target, length in zip(targets, lengths, strict=True):
-        if deadline.passed or not len(q):
-            return []
-        moved = q + length * remaining * drift
-        if ends[1] is not None:
-            moved += length / remaining * (ends[1] - q)
-        moved = np.clip(moved, limits.position_lower, limits.position_upper)
-        q = newton.nearest(np.repeat(target[None], len(q), axis=0), moved)
-        is_inside = (q >= limits.position_lower) & (q <= limits.position_upper)
-        inside = is_inside.all(axis=1)
-        q = q[inside]
-        drift = drift[inside]
-        paths = np.concatenate([paths[inside], q[:, None]], axis=1)
-        remaining -= length
-    posture_limits = [limit for limit in problem.limits if limit.at_rest == "posture"]
-    allowed = (
-        PosturePath(problem, s, postures[::step], np.inf)
-        for postures in paths
-        if all(limit.holds_at_rest(postures, _NEARLY).all() for limit in posture_limits)
-    )
-    return list(itertools.islice(allowed, count))
 
 
 def guess_in_chart(

@@ -199,9 +199,8 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        for batch in find_batches(
-            self._problem, self._decompositions, self._latest, self._listener
-        ):
+        known = (self._problem, self._decompositions, self._latest, self._listener)
+        for batch in find_batches(*known):
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:

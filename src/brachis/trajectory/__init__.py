@@ -8,7 +8,7 @@ from brachis.trajectory.phases import (
     phase_rows,
 )
 from brachis.trajectory.pieces import Pieces
-from brachis.trajectory.program import Component, Event, MotionPart
+from brachis.trajectory.program import Event, MotionPart
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import (
@@ -22,7 +22,6 @@ from brachis.trajectory.trajectory import (
 __all__ = [
     "CONTINUOUS_TORQUE",
     "PHASE_COLUMNS",
-    "Component",
     "Event",
     "MotionPart",
     "MotionPhase",

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from brachis.trajectory.trajectory import Trajectory
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -50,23 +47,3 @@ class Event:
 
     name: str
     time: float
-
-
-@dataclass(frozen=True, eq=False)
-class Component:
-    """A motion within a longer one, with a path, a task space and limits of its own.
-
-    Attributes
-    ----------
-    begin : float
-        Time at which it begins, s.
-    trajectory : Trajectory
-    """
-
-    begin: float
-    trajectory: Trajectory
-
-    @property
-    def end(self) -> float:
-        """Time at which it ends, s."""
-        return self.begin + self.trajectory.t_end

@@ -25,7 +25,7 @@ from brachis.robot import Robot, dynamics
 from brachis.task import Task
 from brachis.trajectory.phases import MotionPhase, PhaseSpline, find_phase_knots
 from brachis.trajectory.pieces import Pieces, piece_coefficients
-from brachis.trajectory.program import Component, Event, MotionPart
+from brachis.trajectory.program import Event, MotionPart
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
@@ -88,8 +88,9 @@ class Trajectory(Summary):
         The parts of a program; empty for a single path or move.
     events : tuple of Event
         The events of a program, in the order of their times.
-    components : tuple of Component
-        The motions of which the motion of a program consists. Each has its own task.
+    components : tuple of (float, Trajectory)
+        The motions of which the motion of a program consists, each with the time at which it begins, s. Each has its
+        own task.
 
     Examples
     --------
@@ -121,7 +122,7 @@ class Trajectory(Summary):
     sensitivities: Sensitivities | None = None
     parts: tuple[MotionPart, ...] = ()
     events: tuple[Event, ...] = ()
-    components: tuple[Component, ...] = ()
+    components: tuple[tuple[float, Trajectory], ...] = ()
 
     def __post_init__(self) -> None:
         """Make the arrays read-only copies."""
@@ -381,9 +382,9 @@ class Trajectory(Summary):
         """Return the data of a result file: the metadata, and the arrays, also those of the components."""
         arrays = {name: getattr(self, name) for name in ARRAYS}
         components = []
-        for place, component in enumerate(self.components):
-            meta, inner = component.trajectory.contents()
-            components.append({"begin": component.begin, **meta})
+        for place, (begin, component) in enumerate(self.components):
+            meta, inner = component.contents()
+            components.append({"begin": begin, **meta})
             arrays |= {f"{place}.{name}": inner[name] for name in ARRAYS}
         meta = {
             "task": self.task.to_dict(),
@@ -412,7 +413,7 @@ class Trajectory(Summary):
         """
         contents = read_result(file_name(path, "path"))
         components = tuple(
-            Component(begin, cls(**parts)) for begin, parts in contents["components"]
+            (begin, cls(**parts)) for begin, parts in contents["components"]
         )
         return cls(**contents | {"components": components})
 

@@ -151,15 +151,13 @@ def _verify_program(
     trajectory = motion.trajectory
     worst: dict[str, Check] = {}
     verified = []
-    for component in trajectory.components:
-        part = verify_trajectory(
-            component.trajectory, motion.options, own_limits=own_limits
-        )
+    for begin, component in trajectory.components:
+        part = verify_trajectory(component, motion.options, own_limits=own_limits)
         verified.append(part)
         for check in part.checks:
             before = worst.get(check.name)
             if before is None or check.share > before.share:
-                worst[check.name] = _within(trajectory, component.begin, check)
+                worst[check.name] = _within(trajectory, begin, check)
     whole = [
         _check_components(motion),
         *check_progress(motion),
@@ -188,9 +186,8 @@ def _check_components(motion: CheckedMotion) -> Check:
     """Check that the whole motion is that of its components, and at rest between them."""
     trajectory = motion.trajectory
     misses = []
-    for component in trajectory.components:
-        part = component.trajectory
-        joints = trajectory.position(component.begin + part.times)
+    for begin, part in trajectory.components:
+        joints = trajectory.position(begin + part.times)
         misses.append(np.abs(joints - part.q[:, : joints.shape[1]]).max())
     allowed = motion.options.posture_tolerance
     return Check("motion of the parts", max(misses), allowed, "rad, m")
