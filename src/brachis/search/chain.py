@@ -185,9 +185,8 @@ class _ChainSearch:
         With a start posture, all begin there.
         """
         part = self.problem.parts[number]
-        self.listener(
-            f"looking for joint paths of {self.problem.sections[number][0].name}"
-        )
+        name = self.problem.sections[number][0].name
+        self.listener(f"looking for joint paths of {name}")
         before = [chain.options[-1].ends[-1] for chain in chains if chain.options]
         after = None
         if number + 1 < len(self.problem.parts):
@@ -199,7 +198,7 @@ class _ChainSearch:
         changed = replace(
             part, beside=beside, start=part.start if start is None else start
         )
-        guesses = self._guesses(changed)
+        guesses = self._guesses(changed, name)
         return [
             _Option(
                 guess.postures_at(np.array([0.0, 1.0]))[:, : self.problem.robot.n],
@@ -209,17 +208,25 @@ class _ChainSearch:
             for guess in guesses
         ]
 
-    def _guesses(self, part: Problem) -> list[InitialGuess]:
+    def _guesses(self, part: Problem, name: str) -> list[InitialGuess]:
         """Find joint paths of a path."""
         own = Decompositions(part, self.families)
+        dead_ends: list[DeadEnd] = []
         if has_charts(part, own):
             found = joint_paths_in_charts(part, own, self.level, self.deadline)
             if not isinstance(found, DeadEnd):
                 return found
+            dead_ends.append(found)
         for batch in batches(part, own, self.deadline, self.listener):
             if batch.guesses:
                 return list(batch.guesses)
-        raise PathError("no joint path was found", where="program")
+            dead_ends += [dead_end for _, dead_end in batch.lattices]
+        why = f": {dead_ends[0]}" if dead_ends else ""
+        raise PathError(
+            f"no joint path of {name} was found{why}",
+            s_interval=dead_ends[0].interval if dead_ends else None,
+            where="program",
+        )
 
     def _guess(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
         """Return the guess of a chain, with straight joint lines as moves."""
