@@ -134,7 +134,7 @@ def plan_for_controller(
 def _find_factors(run: RunReport, robot: Robot) -> dict[str, float]:
     """Return factors on the limits of the robot that compensate for the excess of a run."""
     factors: dict[str, float] = {}
-    for check in run.verification.checks:
+    for check in run.checks:
         excess = check.value / check.allowed
         kind = check.limit.replace(" ", "_")
         if check.name == "path error":

@@ -22,7 +22,7 @@ def test_from_a_plan_for_a_controller_to_the_run_that_came_back(
     assert "verification: passed" in run(f"{export} {tmp_path / 'run.csv'}").out
     # The URDF states 100 rad/s, of which 1 % is too fast.
     message = error_of(f"{export} {tmp_path / 'seam.src'}")
-    assert "s with 500 positions, with the rounding of the language" in message
+    assert "s with 500 positions, rounded for the language" in message
     assert "allowed: 0.001 m, rad and 0.01 s" in message
     data = run(f"{export} {tmp_path / 'seam.src'} --time-tolerance 2 --json").data
     assert data["place"] <= 1e-3

@@ -122,10 +122,10 @@ REFUSED = {
     "axes: [{joint: joint_1}]": "moves has no axis in the profile; found rail, joint_2",
     SWAPPED: "not in the order of the chain; found joint_2, joint_1; allowed: joint_1, joint_2",
     "axes: [{joint: joint_7}]": "no joint named 'joint_7'",
-    "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' has two axes",
+    "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' is given twice",
     "arm: {names: [A1, A2]}": "too few names for axes of the arm; found joint_1",
     "coupled: {A3: {A9: 1}}": "no axis named 'A9'",
-    "arm: {names: [A1, A1, A3, A4, A5, A6]}": "two axes have one name; found A1",
+    "arm: {names: [A1, A1, A3, A4, A5, A6]}": "axis 'A1' is given twice",
     "coupled: {A3: {A3: -1}}": "the axes do not determine the joints",
     "limits: {total_power: 5}": "a profile cannot contain this limit",
     "period: 4": "period: out of range; found 4; allowed: <= 0.1",
@@ -248,3 +248,18 @@ def test_a_wrong_template_is_an_error(template, message, turn, tmp_path):
     path = own_profile(tmp_path, f"program: {{template: '{template}'}}")
     with pytest.raises(InputError, match=message):
         brachis.export.write_for_controller(turn, tmp_path / "run.src", path)
+
+
+@pytest.mark.parametrize("rail", [[], [0.4]])
+def test_a_list_of_limits_has_a_value_for_each_axis_or_each_axis_of_the_arm(
+    rail, turn, tmp_path
+):
+    values = [1.0, 1.1, 1.2, 1.3, 1.4, 1.5, *rail]
+    profile = brachis.load_profile(
+        own_profile(tmp_path, f"limits: {{velocity: {values}}}")
+    )
+    axes = bind_axes(profile, turn.robot)
+    stricter = robot_with_profile(turn.robot, profile, axes).limits.velocity
+    first = rail or turn.robot.limits.velocity[:1]
+    expected = [*first, *values[:6]]
+    np.testing.assert_allclose(stricter, expected)

@@ -21,7 +21,7 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     Raises
     ------
     InputError
-        A list in the profile does not have one value per axis of the arm, or the limits do not fit the robot.
+        A list in the profile does not have one value per axis, or per axis of the arm; or the limits do not fit.
     """
     arm = [
         joint
@@ -29,29 +29,27 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
         if not is_external
     ]
     changes: dict[str, Any] = {}
-    value: Any
+    unscaled = without_scale(robot)
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
-        if LIMIT_KINDS[kind].needs_masses and not robot.has_masses:
+        needs_masses = LIMIT_KINDS[kind].needs_masses and not robot.has_masses
+        if stated in (None, FROM_URDF) or needs_masses:
             continue
-        names = axes.joints if isinstance(stated, Mapping) else arm
-        by_joint = map_by_joint(f"profile.limits.{kind}", stated, names, None)
-        ends = without_scale(robot).limits.both_ways(kind)
-        for joint, value in by_joint.items():
-            if value == FROM_URDF:
-                continue
-            stated_ends = np.array(
-                value if isinstance(value, tuple) else (-value, value)
-            )
-            lower, upper = ends[:, robot.joint_names.index(joint)]
-            pair = (max(lower, stated_ends[0]), min(upper, stated_ends[1]))
+        is_for_all = np.shape(stated) == (len(axes.joints),)
+        names = axes.joints if isinstance(stated, Mapping) or is_for_all else arm
+        lower, upper = unscaled.limits.both_ways(kind)
+        value: Any
+        for joint, value in map_by_joint(
+            f"profile.limits.{kind}", stated, names, None
+        ).items():
+            number = robot.joint_names.index(joint)
+            low, high = value if isinstance(value, tuple) else (-value, value)
+            pair = (max(lower[number], low), min(upper[number], high))
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
     if not changes:
         return robot
-    factors = scale_of(robot)
-    stricter = without_scale(robot).with_limits(**changes)
-    return stricter.with_limits(scale=factors) if factors else stricter
+    return unscaled.with_limits(**changes).with_limits(scale=scale_of(robot))
 
 
 def scale_of(robot: Robot) -> dict[str, float]:

@@ -18,13 +18,13 @@ from brachis.apps.controller.axes import ControllerAxes, bind_axes
 from brachis.apps.controller.limits import robot_with_profile, without_scale
 from brachis.apps.controller.profile import Profile, load_profile
 from brachis.common.arrays import interpolate_columns, spread
-from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.trajectory import MotionSource, Samples, Trajectory, motion_of
 from brachis.verify import Check, Verification, VerifyOptions
+from brachis.verify.checks import check_joints
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.tool import largest_speeds
 from brachis.verify.mechanics import joint_placements, real_tool_placements
@@ -41,9 +41,9 @@ _DIVISORS = (2, 4, 8)
 """Divisors of the period to try when a run fails."""
 
 
-@dataclass(frozen=True, repr=False)
-class RunReport(Summary):
-    """Verification of a motion as a controller will run it.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class RunReport(Verification):
+    """Verification of a motion as a controller will run it: limits of the task and of the profile, path, and both ends.
 
     Attributes
     ----------
@@ -51,8 +51,6 @@ class RunReport(Summary):
         Name of the controller and its interface.
     period : float
         Time between samples, s.
-    verification : Verification
-        Checks of the limits of the task and of the profile, of the path, and of both ends.
     remedies : tuple of str
         Changes, each of which is verified to make the run pass; empty if it passes anyway.
 
@@ -66,29 +64,13 @@ class RunReport(Summary):
 
     controller: str
     period: float
-    verification: Verification
     remedies: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return self.verification.passed
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """Failed checks, in words."""
-        return self.verification.failures
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        data = {**vars(self), "verification": self.verification.to_dict()}
-        return {"passed": self.passed, **data}
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user: every check with its worst value."""
         return {
             "controller": f"{self.controller}, every {1e3 * self.period:g} ms",
-            **self.verification.summary(),
+            **super().summary(),
             "remedies": "; ".join(self.remedies) or "none needed",
         }
 
@@ -139,9 +121,10 @@ def verify_run(
     period = check_period(profile, period)
     robot = robot_with_profile(without_scale(motion.robot), profile, axes)
     run = _Run(motion, profile, axes, robot, tuple(own_limits))
-    verification = run.verify(period)
-    remedies = () if verification.passed else tuple(_find_remedies(run, period))
-    return RunReport(profile.title, period, verification, remedies)
+    report = run.verify(period)
+    if report.passed:
+        return report
+    return replace(report, remedies=tuple(_find_remedies(run, period)))
 
 
 def check_period(profile: Profile, period: float | None) -> float:
@@ -208,7 +191,7 @@ class _Run:
     robot: Robot
     own_limits: tuple[LimitModel, ...]
 
-    def verify(self, period: float) -> Verification:
+    def verify(self, period: float) -> RunReport:
         """Verify the run with a given period, s."""
         profile = self.profile
         samples = self.motion.sample(period, last=profile.last)
@@ -233,9 +216,24 @@ class _Run:
             ratios = [check for check in ratios if check.limit not in replaced]
             ratios += differences
         path_check = _check_path(motion, profile)
-        checks = (path_check, *ratios, *_check_rest(self.motion, profile))
+        checks = [path_check, *ratios]
+        if profile.rest == "full":
+            plan = self.motion
+            ends = [0, -1]
+            allowed = _REST * max(np.abs(plan.qddot).max(), 1.0)
+            name = "acceleration at the ends"
+            instants = (plan.qddot[ends], plan.times[ends])
+            kind = "acceleration"
+            checks.append(check_joints(motion, name, *instants, kind, allowed))
         worst = max((check.value for check in ratios), default=0.0)
-        return Verification(checks, len(motion.states.t), worst, path_check.value)
+        return RunReport(
+            checks=tuple(checks),
+            points=len(motion.states.t),
+            worst_ratio=worst,
+            path_error=path_check.value,
+            controller=profile.title,
+            period=period,
+        )
 
 
 def interpolate(
@@ -365,22 +363,6 @@ def _list_ratios(
     yield "tool speed", 1, (steps / allowed)[:, None], ("tool",)
 
 
-def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
-    """Check that the plan begins and ends as the controller requires."""
-    if profile.rest != "full":
-        return
-    ends = np.abs(motion.qddot[[0, -1]])
-    joint = int(np.argmax(ends.max(axis=0)))
-    allowed = _REST * max(np.abs(motion.qddot).max(), 1.0)
-    yield Check(
-        "acceleration at the ends",
-        ends[:, joint].max(),
-        allowed,
-        "rad/s^2, m/s^2",
-        motion.joint_names[joint],
-    )
-
-
 def _find_remedies(run: _Run, period: float) -> Iterator[str]:
     """Yield the smallest changes that let a run pass, each of them verified."""
     profile = run.profile
@@ -390,27 +372,30 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
     has_speeds = run.motion.task.tool_limits.process_speed
     speeds = () if has_speeds else [0.1 * number for number in range(999, 499, -1)]
 
-    def rounds(decimals: int) -> bool:
-        """Return whether the run passes with a number of decimals."""
-        changed = profile.model_copy(update={"decimals": decimals})
-        return replace(run, profile=changed).verify(period).passed
-
-    def samples(milliseconds: float) -> bool:
-        """Return whether the run passes with a period."""
-        return run.verify(1e-3 * milliseconds).passed
-
-    def slows(percent: float) -> bool:
-        """Return whether the run passes at a percentage of its speed."""
-        slower = slow_down(run.motion, 100.0 / percent)
-        return replace(run, motion=slower).verify(period).passed
+    def passes(changed: _Run, period: float) -> bool:
+        """Return whether a changed run passes."""
+        return changed.verify(period).passed
 
     changes: tuple[tuple[str, Sequence[float], Callable[[Any], bool]], ...] = (
-        ("{} decimals", decimals, rounds),
-        ("a period of {:g} ms", periods, samples),
-        ("{:g} % of the speed", speeds, slows),
+        (
+            "{} decimals",
+            decimals,
+            lambda value: passes(
+                replace(run, profile=profile.model_copy(update={"decimals": value})),
+                period,
+            ),
+        ),
+        ("a period of {:g} ms", periods, lambda value: passes(run, 1e-3 * value)),
+        (
+            "{:g} % of the speed",
+            speeds,
+            lambda value: passes(
+                replace(run, motion=slow_down(run.motion, 100.0 / value)), period
+            ),
+        ),
     )
-    for text, values, passes in changes:
-        index = bisect_left(values, 1, key=passes)
+    for text, values, has_passed in changes:
+        index = bisect_left(values, 1, key=has_passed)
         if index < len(values):
             yield f"the motion passes with {text.format(values[index])}"
     yield "to plan a motion that passes, plan with the profile (--profile)"

@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -99,17 +98,22 @@ def write_for_controller(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    name = _name_format(profile, file_name(path, "path").suffix, form)
+    file = file_name(path, "path")
+    name = _name_format(profile, file.suffix, form)
     if name == PROGRAM:
-        report = _write_program(
+        text, report = write_program(
             motion,
-            path,
             profile,
             axes,
+            file.stem,
             moves=moves,
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
+        first_line = re.escape(text.partition("\n")[0]).encode()
+        beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
+        with atomic_write(path, beginning) as stream:
+            stream.write(text.encode())
         robot = robot_with_profile(without_scale(motion.robot), profile, axes)
         verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
         _warn(profile, verification.failures)
@@ -150,23 +154,6 @@ def _name_format(profile: Profile, suffix: str, form: str | None) -> str:
             allowed=f"{', '.join(shown)}: {profile.title}",
         )
     return name
-
-
-def _write_program(
-    motion: Trajectory,
-    path: str | os.PathLike[str],
-    profile: Profile,
-    axes: ControllerAxes,
-    **options: Any,
-) -> ProgramReport:
-    """Write a program of positions; see `write_program`."""
-    name = file_name(path, "path").stem
-    text, report = write_program(motion, profile, axes, name, **options)
-    first_line = re.escape(text.partition("\n")[0]).encode()
-    beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
-    with atomic_write(path, beginning) as stream:
-        stream.write(text.encode())
-    return report
 
 
 def _warn(profile: Profile, reasons: Sequence[str]) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from brachis.apps.controller import ControllerAxes, Language, Profile, nearest_on_path
 from brachis.apps.export.rows import require_library
+from brachis.common.arrays import apply_each
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.path import path_of
@@ -261,7 +262,7 @@ class _Follower:
                 raise InputError(
                     "no program of positions is within the tolerance",
                     where="tolerance",
-                    found=f"{place:.3g} m, rad and {time:.3g} s with {_MOST} positions, with the rounding of the language",
+                    found=f"{place:.3g} m, rad and {time:.3g} s with {_MOST} positions, rounded for the language",
                     allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
                 )
             if place <= tolerance and time <= time_tolerance:
@@ -319,29 +320,31 @@ class _Follower:
         The external axes move on straight lines, and the arm's joints follow the tool by Newton's method.
         """
         arm = self.axes.index[~np.array(self.axes.external)]
-        for first, last in pairwise(nodes.tolist()):
-            before = self.q[first]
-            after = self.q[last]
-            q = before
-            for u in np.linspace(0.0, 1.0, _LINE_STEPS + 1)[1:]:
-                target = (1.0 - u) * self.followed[first] + u * self.followed[last]
-                line = (1.0 - u) * before + u * after
-                line[arm] = q[arm]
-                q = line
-                for _ in range(_NEWTON_STEPS):
-                    values = self.task_map.values(q[None])
-                    miss = self.task_map.difference(target[None], values)[0]
-                    slopes = self.task_map.jacobian(self.task_map.twists(q[None]))[0]
-                    q[arm] += np.linalg.lstsq(slopes[:, arm], miss, rcond=None)[0]
-            off = np.abs(q - after)
-            if off.max() > _SAME_POSTURE:
-                joint = self.motion.joint_names[int(np.argmax(off))]
-                raise InputError(
-                    "on a line of the tool the arm would come to another posture than the plan's",
-                    where="moves",
-                    found=f"{joint} off by {off.max():.3g} rad after {self.t[last]:.4g} s",
-                    allowed="joint, or a plan whose arm does not pass a singular posture",
-                )
+        before = self.q[nodes[:-1]]
+        after = self.q[nodes[1:]]
+        begin = self.followed[nodes[:-1]]
+        end = self.followed[nodes[1:]]
+        q = before
+        for u in np.linspace(0.0, 1.0, _LINE_STEPS + 1)[1:]:
+            line = (1.0 - u) * before + u * after
+            line[:, arm] = q[:, arm]
+            q = line
+            target = (1.0 - u) * begin + u * end
+            for _ in range(_NEWTON_STEPS):
+                miss = self.task_map.difference(target, self.task_map.values(q))
+                slopes = self.task_map.jacobian(self.task_map.twists(q))
+                inverse = np.linalg.pinv(slopes[:, :, arm])
+                q[:, arm] += apply_each(inverse, miss)
+        off = np.abs(q - after)
+        row, joint = map(int, np.unravel_index(np.argmax(off), off.shape))
+        if off[row, joint] > _SAME_POSTURE:
+            raise InputError(
+                "on a line of the tool the arm would come to another posture than the plan's",
+                where="moves",
+                found=f"{self.motion.joint_names[joint]} off by {off[row, joint]:.3g} rad "
+                f"after {self.t[nodes[row + 1]]:.4g} s",
+                allowed="joint, or a plan whose arm does not pass a singular posture",
+            )
 
     def describe(self, nodes: np.ndarray) -> dict[str, np.ndarray]:
         """Return what a template may say of each position; see `Language`.
