@@ -152,7 +152,7 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
         ({"moves": "linear"}, "samples have no moves"),
         (
             {"form": "json"},
-            r"not accept this format; found json; allowed: csv \(.csv\), program \(.src\)",
+            "no format of KUKA.* named 'json'; allowed: csv, program",
         ),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -91,7 +91,7 @@ class Tracking(Summary):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
-        return {**vars(self), "axes": [vars(axis) for axis in self.axes]}
+        return asdict(self)
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
 import numpy as np
 
-from brachis.apps.controller.profile import Axis, AxisGroup, Profile
+from brachis.apps.controller.profile import Axis, Profile
 from brachis.common.arguments import check_once
 from brachis.errors import InputError, check_names
 from brachis.robot import Robot
@@ -113,11 +113,9 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
             found=", ".join(arm),
             allowed=", ".join(in_order),
         )
-    axis_names = _name_axes(axes, profile)
-    axis_units = [
-        profile_unit(profile.external if axis.external else profile.arm, units[joint])
-        for axis, joint in zip(axes, joints, strict=True)
-    ]
+    named = _name_axes(axes, profile, units)
+    axis_names, axis_units = map(tuple, zip(*named, strict=True))
+    check_once("axis", axis_names, "profile")
     coupling = np.eye(len(axes))
     for name, factors in profile.coupled.items():
         check_names("axis", [name, *factors], axis_names, "profile.coupled")
@@ -133,19 +131,14 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
         axis.sign * FACTORS[unit] for axis, unit in zip(axes, axis_units, strict=True)
     ]
     return ControllerAxes(
-        tuple(axis_names),
-        tuple(axis_units),
+        axis_names,
+        axis_units,
         tuple(axis.external for axis in axes),
         tuple(joints),
         np.array([names.index(joint) for joint in joints]),
         np.array([axis.zero for axis in axes]),
         coupling @ np.diag(scales),
     )
-
-
-def profile_unit(group: AxisGroup, unit: str) -> str:
-    """Return the unit that a group uses for axes whose joints have the SI unit ``rad`` or ``m``."""
-    return group.angle if unit == "rad" else group.length
 
 
 def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, ...]:
@@ -156,11 +149,12 @@ def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, 
     return tuple(Axis(joint=name, external=name not in arm) for name in ordered)
 
 
-def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
-    """Return the name of each axis: its own, otherwise the next one of its group, otherwise that of its joint."""
+def _name_axes(
+    axes: Sequence[Axis], profile: Profile, units: dict[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the name of each axis (its own, the next one of its group, or that of its joint) and its unit."""
     groups = {False: profile.arm, True: profile.external}
     unused = {kind: iter(group.names) for kind, group in groups.items()}
-    names = []
     for axis in axes:
         group = groups[axis.external]
         default = axis.joint if not group.names else None
@@ -174,6 +168,4 @@ def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
                 allowed=", ".join(group.names),
                 hint="Name the axes in a profile of your own; a rail has external: true",
             )
-        names.append(name)
-    check_once("axis", names, "profile")
-    return names
+        yield name, group.angle if units[axis.joint] == "rad" else group.length

@@ -118,33 +118,20 @@ def verify_run(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    period = check_period(profile, period)
-    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-    run = _Run(motion, profile, axes, robot, tuple(own_limits))
-    report = run.verify(period)
-    if report.passed:
-        return report
-    return replace(report, remedies=tuple(_find_remedies(run, period)))
-
-
-def check_period(profile: Profile, period: float | None) -> float:
-    """Return the period of the samples for a controller, s; by default the period of the profile.
-
-    Raises
-    ------
-    InputError
-        The controller accepts only its own period.
-    """
-    if period is None or period == profile.period:
-        return profile.period
-    if profile.fixed_period:
+    period = profile.period if period is None else period
+    if profile.fixed_period and period != profile.period:
         raise InputError(
             "the controller does not accept this period",
             where="dt",
             found=f"{period:g} s",
             allowed=f"{profile.period:g} s ({profile.title})",
         )
-    return period
+    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
+    run = _Run(motion, profile, axes, robot, tuple(own_limits))
+    report = run.verify(period)
+    if report.passed:
+        return report
+    return replace(report, remedies=tuple(_find_remedies(run, period)))
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
