@@ -38,7 +38,7 @@ _STILL = 1e-9
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
 _DIVISORS = (2, 4, 8)
-"""Divisors of the period to try when a run fails."""
+"""Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
