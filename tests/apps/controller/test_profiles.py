@@ -132,7 +132,7 @@ REFUSED = {
     "formats: [krl]": "no format of samples named 'krl'",
     "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
     "events: {start: x}": "no event with this name",
-    "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
+    "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6, for the arm; limits of external axes",
 }
 
 
@@ -250,16 +250,14 @@ def test_a_wrong_template_is_an_error(template, message, turn, tmp_path):
         brachis.export.write_for_controller(turn, tmp_path / "run.src", path)
 
 
-@pytest.mark.parametrize("rail", [[], [0.4]])
-def test_a_list_of_limits_has_a_value_for_each_axis_or_each_axis_of_the_arm(
-    rail, turn, tmp_path
-):
-    values = [1.0, 1.1, 1.2, 1.3, 1.4, 1.5, *rail]
-    profile = brachis.load_profile(
-        own_profile(tmp_path, f"limits: {{velocity: {values}}}")
-    )
-    axes = bind_axes(profile, turn.robot)
-    stricter = robot_with_profile(turn.robot, profile, axes).limits.velocity
-    first = rail or turn.robot.limits.velocity[:1]
-    expected = [*first, *values[:6]]
-    np.testing.assert_allclose(stricter, expected)
+def test_a_list_of_limits_is_for_the_arm_and_a_mapping_for_all_axes(turn, tmp_path):
+    values = [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    by_joint = "{joint_1: 0.9, rail: 0.4}"
+    expected = {str(values): values, by_joint: [0.9]}
+    for text, arm in expected.items():
+        path = own_profile(tmp_path, f"limits: {{velocity: {text}}}")
+        profile = brachis.load_profile(path)
+        axes = bind_axes(profile, turn.robot)
+        stricter = robot_with_profile(turn.robot, profile, axes).limits.velocity
+        np.testing.assert_allclose(stricter[1 : 1 + len(arm)], arm)
+    assert stricter[0] == 0.4

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from brachis.apps.controller.axes import ControllerAxes
 from brachis.apps.controller.profile import Profile
+from brachis.errors import InputError
 from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import LIMIT_KINDS
@@ -21,7 +20,7 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     Raises
     ------
     InputError
-        A list in the profile does not have one value per axis, or per axis of the arm; or the limits do not fit.
+        A list in the profile does not have one value per axis of the arm, or the limits do not fit the robot.
     """
     arm = [
         joint
@@ -35,8 +34,14 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
         needs_masses = LIMIT_KINDS[kind].needs_masses and not robot.has_masses
         if stated in (None, FROM_URDF) or needs_masses:
             continue
-        is_for_all = np.shape(stated) == (len(axes.joints),)
-        names = axes.joints if isinstance(stated, Mapping) or is_for_all else arm
+        if isinstance(stated, tuple) and len(stated) != len(arm):
+            raise InputError(
+                "wrong number of values",
+                where=f"profile.limits.{kind}",
+                found=len(stated),
+                allowed=f"{len(arm)}, for the arm; limits of external axes need a mapping by joint",
+            )
+        names = axes.joints if isinstance(stated, Mapping) else arm
         lower, upper = unscaled.limits.both_ways(kind)
         value: Any
         for joint, value in map_by_joint(

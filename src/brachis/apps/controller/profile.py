@@ -122,7 +122,7 @@ class Profile(CheckedModel):
     program: Language | None = None
     """Language of programs of positions."""
     limits: LimitSpec = Field(default_factory=LimitSpec)
-    """Limits that the controller checks, as in robot.limits; lists in the order of the arm axes, or of all axes."""
+    """Limits that the controller checks, as in robot.limits; lists in the order of the arm axes."""
     rest: Literal["velocity", "full"] = "velocity"
     """Derivatives that must be zero at both ends: velocity, or full (also the acceleration)."""
     decimals: Annotated[Count, Field(ge=0, le=12)] | None = None
