@@ -22,12 +22,15 @@ from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_ch
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import step_lengths
 from brachis.search.moves import guess_along
+from brachis.search.order import find_orders
 from brachis.search.schedule import Batch, batches, has_charts
 from brachis.search.screening import screen
 from brachis.search.stages import ChainGuess, InitialGuess
 
 _SHARE = 0.4
 """Fraction of the remaining time in which the joint paths of all paths are sought."""
+_NODES = 8
+"""Number of joint paths of each path among which the best order is sought."""
 _SCREENED = 3
 """Number of chains that are improved for each one that is kept."""
 
@@ -103,6 +106,8 @@ class _ChainSearch:
 
     def best_guesses(self) -> list[ChainGuess]:
         """Return guesses of the whole program, the fastest first."""
+        if self.problem.task.order == "free":
+            return self._guesses_in_any_order()
         parts = self.problem.parts
         start = self.problem.start
         first = 0
@@ -123,9 +128,72 @@ class _ChainSearch:
         chains = self._extend(chains, order)
         chains = sorted(chains, key=lambda chain: chain.time)
         return [
-            self._guess(chain, order)
+            self.guess_of(chain, order)
             for chain in chains[: _SCREENED * self.level.in_charts]
         ]
+
+    def _guesses_in_any_order(self) -> list[ChainGuess]:
+        """Return guesses of the whole program in the best orders of its paths, the fastest first."""
+        problem = self.problem
+        parts = problem.parts
+        paths = [number for number, part in enumerate(parts) if part.task_map.m]
+        move = next(part for part in parts if not part.task_map.m)
+        nodes: list[tuple[int, _Option]] = []
+        for number in paths:
+            beside = [_Chain((option,)) for _, option in nodes]
+            if problem.start is not None:
+                beside.append(_Chain((_Option(np.array([problem.start] * 2)),)))
+            options = sorted(
+                self._options(number, beside), key=lambda option: option.time
+            )
+            nodes += [(number, option) for option in options[:_NODES]]
+        groups = np.array([paths.index(number) for number, _ in nodes])
+        times = np.array([option.time for _, option in nodes])
+        begins = np.array([option.ends[0] for _, option in nodes])
+        ends = np.array([option.ends[1] for _, option in nodes])
+        prices = (
+            np.array([price_moves(move, ends, begin) for begin in begins]).T + times
+        )
+        zeros = np.zeros(len(nodes))
+        count = _SCREENED * self.level.in_charts
+        if problem.is_closed:
+            found = []
+            for root in np.flatnonzero(groups == 0):
+                first = np.where(np.arange(len(nodes)) == root, times, np.inf)
+                back = price_moves(move, ends, begins[root])
+                found += find_orders(prices, first, back, groups, count)
+        else:
+            start, end = problem.start, problem.end
+            first = times + (
+                zeros if start is None else price_moves(move, begins, start)
+            )
+            last = zeros if end is None else price_moves(move, ends, end)
+            found = find_orders(prices, first, last, groups, count)
+        found.sort(key=lambda way: way[0])
+        return [
+            self._guess_in_order(time, [nodes[node] for node in way])
+            for time, way in found[:count]
+        ]
+
+    def _guess_in_order(
+        self, time: float, visited: Sequence[tuple[int, _Option]]
+    ) -> ChainGuess:
+        """Return the guess of the program with its paths in an order."""
+        problem = self.problem
+        paths = iter(number for number, _ in visited)
+        order = [
+            next(paths) if part.task_map.m else number
+            for number, part in enumerate(problem.parts)
+        ]
+        options = [option for _, option in visited]
+        if problem.start is not None:
+            options.insert(0, _Option(np.array([problem.start] * 2)))
+        if problem.end is not None:
+            options.append(_Option(np.array([problem.end] * 2)))
+        elif problem.is_closed:
+            options.append(_Option(options[0].ends[[0, 0]]))
+        search = replace(self, problem=problem.reordered(order))
+        return search.guess_of(_Chain(tuple(options), time), range(len(order)))
 
     def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
         """Continue chains with parts, given by their numbers."""
@@ -228,7 +296,7 @@ class _ChainSearch:
             where="program",
         )
 
-    def _guess(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
+    def guess_of(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
         """Return the guess of a chain, with straight joint lines as moves."""
         options = list(chain.options)
         guesses: dict[int, InitialGuess] = {}
