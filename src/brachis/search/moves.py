@@ -5,24 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
 from brachis.errors import TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
 from brachis.problem.problem import Problem
+from brachis.search.guesses import SearchLevel
+from brachis.search.holding import explain_postures
 from brachis.search.phase_plane import least_time
+from brachis.search.sampled_paths import FreeSpace, sample_joint_path
+from brachis.search.screening import screen
 from brachis.search.stages import InitialGuess
 
+SAMPLED = 2
+"""Number of joint paths that are sampled for each one that a level plans."""
+_ITERATIONS = 3000
+"""Number of samples after which OMPL gives up."""
 _STATIONS = 97
 """Number of postures along the joint path of a guess."""
 
 
-def move_guesses(problem: Problem) -> list[InitialGuess]:
-    """Find joint paths of a move between two given postures.
-
-    Raises
-    ------
-    TaskError
-        The start or end posture is missing.
-    """
+def check_ends(problem: Problem) -> None:
+    """Raise TaskError if the start or end posture of a move is missing."""
     for end in ("start", "end"):
         if end not in problem.given_postures:
             raise TaskError(
@@ -31,7 +35,39 @@ def move_guesses(problem: Problem) -> list[InitialGuess]:
                 found="free",
                 allowed="a posture",
             )
-    return [guess_along(problem, np.array([problem.start, problem.end]), "line")]
+
+
+def move_guesses(
+    problem: Problem, level: SearchLevel, deadline: Deadline, listener: Listener
+) -> list[InitialGuess]:
+    """Find joint paths of a move: the straight one, or if something is in its way, the most promising ones round it.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem with both postures.
+    level : SearchLevel
+    deadline : Deadline
+    listener : callable
+
+    Raises
+    ------
+    PathError
+        No joint path is free.
+    """
+    straight = guess_along(problem, np.array([problem.start, problem.end]), "line")
+    space = FreeSpace.of(problem)
+    if space.joins(problem.start, problem.end):
+        return [straight]
+    guesses = []
+    for seed in range(1, 1 + SAMPLED * level.in_charts):
+        listener(f"looking for a joint path round what is in the way ({seed})")
+        q = sample_joint_path(problem, space, seed, _ITERATIONS, deadline)
+        if q is not None:
+            guesses.append(guess_along(problem, q, f"RRT-Connect {seed}"))
+        elif not guesses:
+            raise explain_postures([straight])
+    return screen(guesses, level.in_charts, deadline, listener)
 
 
 def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:

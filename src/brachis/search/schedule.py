@@ -27,7 +27,7 @@ from brachis.search.guesses import (
 )
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_TIME, DeadEnd
-from brachis.search.moves import move_guesses
+from brachis.search.moves import check_ends, move_guesses
 from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
@@ -97,14 +97,18 @@ def batches(
     """
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
+    if not problem.task_map.m:
+        check_ends(problem)
+        find = partial(_guess_moves, problem, deadline, listener)
+        guesses = yield from _level_by_level(levels, solvers, find)
+        for solver in solvers[1:]:
+            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+        return
     if not problem.task_map.is_of_tool:
-        is_move = not problem.task_map.m
-        guesses = move_guesses(problem) if is_move else [joint_space_guess(problem)]
-        refuse_hopeless(guesses)
-        for solver in solvers:
-            is_first = solver == solvers[0]
-            solver_guesses = _with_solvers(guesses, [solver])
-            yield Batch(solver_guesses, len(guesses), fallback=not is_first)
+        guess = joint_space_guess(problem)
+        refuse_hopeless([guess])
+        for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
+            yield Batch([solver_guess], 1, fallback=number > 0)
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
@@ -156,6 +160,15 @@ def _level_by_level(
                 [] if first else lattices,
             )
     return guesses
+
+
+def _guess_moves(
+    problem: Problem, deadline: Deadline, listener: Listener, level: SearchLevel
+) -> GuessesAndLattices:
+    """Find guesses of a move."""
+    guesses = move_guesses(problem, level, deadline.part(_LATTICE_SHARE), listener)
+    refuse_hopeless(guesses)
+    return guesses, []
 
 
 def _guess_in_charts(
