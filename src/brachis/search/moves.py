@@ -14,7 +14,7 @@ from brachis.search.guesses import SearchLevel
 from brachis.search.holding import explain_postures
 from brachis.search.phase_plane import least_time
 from brachis.search.sampled_paths import FreeSpace, sample_joint_path
-from brachis.search.screening import screen
+from brachis.search.screening import screen_coarsely
 from brachis.search.stages import InitialGuess
 
 SAMPLED = 2
@@ -67,7 +67,8 @@ def move_guesses(
             guesses.append(guess_along(problem, q, f"RRT-Connect {seed}"))
         elif not guesses:
             raise explain_postures([straight])
-    return screen(guesses, level.in_charts, deadline, listener)
+    count = max(1, level.in_charts // 2)
+    return screen_coarsely(guesses, count, deadline, listener)
 
 
 def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:

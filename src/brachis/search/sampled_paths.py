@@ -29,8 +29,6 @@ _TYPICAL_TIME = 0.5
 """Time, s, that weighs velocities against accelerations, as in the length of the lattice."""
 _LEAST_WEIGHT = 0.05
 """Minimum weight of a joint, as a fraction of the largest. Joints without a limit would turn at random."""
-_SMOOTHINGS = 3
-"""Number of times that OMPL smooths the corners of a joint path."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +153,6 @@ def sample_joint_path(
         return None
     path = setup.getSolutionPath()
     simplifier = geometric.PathSimplifier(information)
-    simplifier.simplifyMax(path)
-    simplifier.smoothBSpline(path, _SMOOTHINGS)
+    simplifier.reduceVertices(path)
+    simplifier.partialShortcutPath(path)
     return np.array([posture(state) for state in path.getStates()])
