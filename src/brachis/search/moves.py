@@ -10,15 +10,13 @@ from brachis.common.progress import Listener
 from brachis.errors import TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
 from brachis.problem.problem import Problem
-from brachis.search.guesses import SearchLevel
+from brachis.search.guesses import SCREENED, SearchLevel
 from brachis.search.holding import explain_postures
 from brachis.search.phase_plane import least_time
 from brachis.search.sampled_paths import FreeSpace, sample_joint_path
 from brachis.search.screening import screen_coarsely
 from brachis.search.stages import InitialGuess
 
-SAMPLED = 2
-"""Number of joint paths that are sampled for each one that a level plans."""
 _ITERATIONS = 3000
 """Number of samples after which OMPL gives up."""
 _STATIONS = 97
@@ -60,7 +58,7 @@ def move_guesses(
     if space.joins(problem.start, problem.end):
         return [straight]
     guesses = []
-    for seed in range(1, 1 + SAMPLED * level.in_charts):
+    for seed in range(1, 1 + SCREENED * level.in_charts):
         listener(f"looking for a joint path round what is in the way ({seed})")
         q = sample_joint_path(problem, space, seed, _ITERATIONS, deadline)
         if q is not None:
