@@ -46,7 +46,10 @@ SAMPLES = 20_000
 """Number of samples after which OMPL gives up."""
 INSTANTS = 2000
 """Number of instants at which MuJoCo measures distances."""
-COMPILER = '<mujoco><compiler discardvisual="true" fusestatic="false" inertiafromgeom="false" balanceinertia="true" strippath="false"/></mujoco>'
+COMPILER = (
+    '<mujoco><compiler discardvisual="true" fusestatic="false" inertiafromgeom="false" '
+    'balanceinertia="true" strippath="false"/></mujoco>'
+)
 
 
 @dataclass(frozen=True)
@@ -107,19 +110,10 @@ def is_free(problem: Problem, q: np.ndarray) -> bool:
     )
 
 
-def draw_move(robot: str, seed: int, number: int) -> Move | None:
-    """Draw a move; None where nothing is in the way, or OMPL finds no way round."""
-    rng = np.random.default_rng([77, seed, number, ROBOTS.index(robot)])
-    model = load(robot)
-    limits = model.limits.both_ways("position")
-    low, high = np.where(np.isfinite(limits), limits, [[-2.0], [2.0]])
-    for _ in range(100):
-        ends = low + rng.uniform(0.15, 0.85, (2, model.n)) * (high - low)
-        alone = bind(robot, [], ends)
-        if alone is not None:
-            break
-    else:
-        return None
+def draw_bodies(
+    rng: np.random.Generator, model: brachis.Robot, task: Task, ends: np.ndarray
+) -> list[dict[str, Any]]:
+    """Draw bodies clear of both ends, (2, n): first one in the straight way; none where that fails."""
     straight = np.linspace(*ends, 60)
     wanted = int(rng.integers(1, 6))
     bodies: list[dict[str, Any]] = []
@@ -134,16 +128,31 @@ def draw_move(robot: str, seed: int, number: int) -> Move | None:
             places = data.oMi[joint].translation, data.oMf[model.frame_id].translation
             centre = places[0] + rng.uniform() * (places[1] - places[0])
         body = draw_body(rng, centre)
-        if distance_to(model, alone.task, ends, body)[0] < SPARE:
+        if distance_to(model, task, ends, body)[0] < SPARE:
             continue
-        if not bodies and distance_to(model, alone.task, straight, body)[0] > 0.0:
+        if not bodies and distance_to(model, task, straight, body)[0] > 0.0:
             continue
         bodies.append(body)
         if len(bodies) == wanted:
             break
-    if not bodies:
+    return bodies
+
+
+def draw_move(robot: str, seed: int, number: int) -> Move | None:
+    """Draw a move; None where nothing is in the way, or OMPL finds no way round."""
+    rng = np.random.default_rng([77, seed, number, ROBOTS.index(robot)])
+    model = load(robot)
+    limits = model.limits.both_ways("position")
+    low, high = np.where(np.isfinite(limits), limits, [[-2.0], [2.0]])
+    for _ in range(100):
+        ends = low + rng.uniform(0.15, 0.85, (2, model.n)) * (high - low)
+        alone = bind(robot, [], ends)
+        if alone is not None:
+            break
+    else:
         return None
-    problem = bind(robot, bodies, ends)
+    bodies = draw_bodies(rng, model, alone.task, ends)
+    problem = bind(robot, bodies, ends) if bodies else None
     if problem is None:
         return None
     paths = [path for seed in SEEDS for path in library_paths(problem, seed)]

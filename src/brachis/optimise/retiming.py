@@ -20,6 +20,7 @@ from brachis.optimise.path_program import (
     PathProgram,
     violation_of_postures,
 )
+from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
@@ -317,9 +318,10 @@ def improve_joint_paths(
     return best
 
 
-def _divisor_of(program: Program) -> int:
-    """Return the divisor of the number of intervals: more than 1 only in a move."""
-    return 1 if program.phases[0].joint_map.task_map.m else _FEWER_IN_MOVES
+def _divisor_of(phase: Phase) -> int:
+    """Return the divisor of the number of intervals: more than 1 only in a move, in which all joints are redundant."""
+    joint_map = phase.joint_map
+    return _FEWER_IN_MOVES if joint_map.r == joint_map.robot.n else 1
 
 
 def _better(
@@ -335,7 +337,7 @@ def _better(
         share = phase_timing.t_end / best.t_end
         count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
         stations = int(_PLACES_AN_INTERVAL * count)
-        count = max(_LEAST_INTERVALS, count // _divisor_of(program))
+        count = max(_LEAST_INTERVALS, count // _divisor_of(phase))
         phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)

@@ -7,7 +7,7 @@ import numpy as np
 from brachis.common.arrays import interpolate_columns
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.errors import TaskError
+from brachis.errors import PathError, TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
 from brachis.problem.problem import Problem
 from brachis.search.guesses import SCREENED, SearchLevel
@@ -17,22 +17,12 @@ from brachis.search.sampled_paths import FreeSpace, sample_joint_path
 from brachis.search.screening import screen_coarsely
 from brachis.search.stages import InitialGuess
 
-_ITERATIONS = 3000
-"""Number of samples after which OMPL gives up."""
+_SAMPLES = 3000
+"""Number of samples after which OMPL gives up. The hardest of 30 moves needed 1500."""
+_TRIES = 3
+"""Number of times that OMPL may give up before there is no joint path."""
 _STATIONS = 97
 """Number of postures along the joint path of a guess."""
-
-
-def check_ends(problem: Problem) -> None:
-    """Raise TaskError if the start or end posture of a move is missing."""
-    for end in ("start", "end"):
-        if end not in problem.given_postures:
-            raise TaskError(
-                "a move needs a start posture and an end posture",
-                where=end,
-                found="free",
-                allowed="a posture",
-            )
 
 
 def move_guesses(
@@ -43,30 +33,64 @@ def move_guesses(
     Parameters
     ----------
     problem : Problem
-        Problem with both postures.
     level : SearchLevel
     deadline : Deadline
     listener : callable
 
     Raises
     ------
+    TaskError
+        The start or end posture is missing.
     PathError
-        No joint path is free.
+        No joint path was found.
+    NotInstalledError
+        Something is in the way, and OMPL is missing.
     """
-    straight = guess_along(problem, np.array([problem.start, problem.end]), "line")
+    for end in ("start", "end"):
+        if end not in problem.given_postures:
+            raise TaskError(
+                "a move needs a start posture and an end posture",
+                where=end,
+                found="free",
+                allowed="a posture",
+            )
+    ends = np.array([problem.start, problem.end])
+    straight = guess_along(problem, ends, "line")
     space = FreeSpace.of(problem)
-    if space.joins(problem.start, problem.end):
+    if space.joins(*ends):
         return [straight]
-    guesses = []
+    guesses: list[InitialGuess] = []
     for seed in range(1, 1 + SCREENED * level.in_charts):
-        listener(f"looking for a joint path round what is in the way ({seed})")
-        q = sample_joint_path(problem, space, seed, _ITERATIONS, deadline)
+        if deadline.passed or (seed > _TRIES and not guesses):
+            break
+        listener(f"sampling joint path {seed} round what is in the way")
+        q = sample_joint_path(problem, space, seed, _SAMPLES, deadline)
         if q is not None:
             guesses.append(guess_along(problem, q, f"RRT-Connect {seed}"))
-        elif not guesses:
-            raise explain_postures([straight])
+    if not guesses:
+        raise _explain_blocked(straight)
     count = max(1, level.in_charts // 2)
     return screen_coarsely(guesses, count, deadline, listener)
+
+
+def _explain_blocked(straight: InitialGuess) -> PathError:
+    """Tell what is in the way of a straight joint path round which no other was found."""
+    cause = explain_postures([straight])
+    problem = "no joint path from the start to the end posture was found"
+    if cause is None or cause.s_interval is None:
+        return PathError(problem, where="task_space: free")
+    middle = np.array([np.mean(cause.s_interval)])
+    posture = ", ".join(
+        f"{position:.3g}" for position in straight.postures_at(middle)[0]
+    )
+    return PathError(
+        f"{problem}, and on the straight one {cause.problem}",
+        s_interval=cause.s_interval,
+        where="task_space: free",
+        found=f"{cause.found}, near the posture [{posture}]",
+        allowed=cause.allowed,
+        hint="Move what is in the way, or choose other postures",
+    )
 
 
 def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:

@@ -6,7 +6,6 @@ Its coordinates are the joint positions times `step_weights`, so that short join
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,7 +72,11 @@ def step_weights(problem: Problem) -> np.ndarray:
     )
     weights = accelerations + _TYPICAL_TIME * velocities
     largest = weights.max()
-    return np.maximum(weights, _LEAST_WEIGHT * largest) if largest else 1.0 / problem.robot.scales
+    return (
+        np.maximum(weights, _LEAST_WEIGHT * largest)
+        if largest
+        else 1.0 / problem.robot.scales
+    )
 
 
 def sample_joint_path(

@@ -27,7 +27,7 @@ from brachis.search.guesses import (
 )
 from brachis.search.hopeless import refuse_hopeless
 from brachis.search.joint_path import NO_TIME, DeadEnd
-from brachis.search.moves import check_ends, move_guesses
+from brachis.search.moves import move_guesses
 from brachis.search.processes import run_in_processes
 from brachis.search.stages import InitialGuess
 
@@ -98,11 +98,8 @@ def batches(
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
     if not problem.task_map.m:
-        check_ends(problem)
         find = partial(_guess_moves, problem, deadline, listener)
-        guesses = yield from _level_by_level(levels, solvers, find)
-        for solver in solvers[1:]:
-            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+        yield from _batches_with_fallbacks(levels, solvers, find)
         return
     if not problem.task_map.is_of_tool:
         guess = joint_space_guess(problem)
@@ -112,9 +109,7 @@ def batches(
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
-        guesses = yield from _level_by_level(levels, solvers, find)
-        for solver in solvers[1:]:
-            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+        yield from _batches_with_fallbacks(levels, solvers, find)
         levels = tuple(replace(level, fallback=True) for level in levels)
     if not decompositions:
         return
@@ -137,6 +132,17 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
     if not is_open or task.search.guesses != "lattice":
         return False
     return problem.r > 0 or not decompositions
+
+
+def _batches_with_fallbacks(
+    levels: Sequence[SearchLevel],
+    solvers: Sequence[str],
+    find: Callable[[SearchLevel], GuessesAndLattices],
+) -> Iterator[Batch]:
+    """Yield the batches of all levels, then the first guesses with the other solvers."""
+    guesses = yield from _level_by_level(levels, solvers, find)
+    for solver in solvers[1:]:
+        yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
 
 
 def _level_by_level(
