@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -222,7 +221,9 @@ def library_time(move: Move) -> float:
     return min(times)
 
 
-def find_smallest(task: Task, trajectory: brachis.Trajectory) -> float:
+def find_smallest(
+    task: Task, trajectory: brachis.Trajectory, count: int = INSTANTS
+) -> float:
     """Return the smallest distance of the pairs of the scene along a motion, by MuJoCo, m."""
     import mujoco
 
@@ -254,7 +255,7 @@ def find_smallest(task: Task, trajectory: brachis.Trajectory) -> float:
         counts[key] = counts.get(key, 0) + 1
     order = [model.joint(name).qposadr[0] for name in robot.joint_names]
     least = np.inf
-    for q in trajectory.position(np.linspace(0.0, trajectory.t_end, INSTANTS)):
+    for q in trajectory.position(np.linspace(0.0, trajectory.t_end, count)):
         data.qpos[order] = q
         mujoco.mj_kinematics(model, data)
         for first, second in scene.pairs:
@@ -287,35 +288,66 @@ def add_body(mujoco: Any, spec: Any, body: Any) -> None:
     )
 
 
-def plan_move(move: Move, effort: str) -> tuple[tuple[str, ...], float, float]:
-    """Plan a move; return a row of the table, the gain as a fraction, and the processor time, s."""
+@dataclass(frozen=True)
+class Outcome:
+    """A plan of a move beside the library's joint path: times, s, smallest distance, m, and processor time, s."""
+
+    library: float
+    t_end: float
+    is_verified: bool
+    distance: float
+    seconds: float
+
+    @property
+    def gain(self) -> float:
+        """Fraction of the library's time that the plan saves."""
+        return 1.0 - self.t_end / self.library
+
+
+def plan_move(move: Move, effort: str) -> Outcome:
+    """Plan a move, print a row, and return the outcome."""
     library = library_time(move)
-    began = time.perf_counter()
     busy = processor_time()
     try:
         result = brachis.plan(move.task, effort=effort, strict=False)
     except BrachisError as error:
-        words = f"{type(error).__name__}: {str(error)[:200]}"
-        return (move.name, f"{library:.4f} s", words, "", "", ""), -np.inf, 0.0
-    seconds = processor_time() - busy
-    wall = time.perf_counter() - began
-    gain = 1.0 - result.t_end / library
-    clear = find_smallest(move.task, result.trajectory)
-    verdict = f"{result.t_end:.4f} s" + ("" if result.verified else " NOT verified")
-    row = (
+        print(f"{move.name} | {type(error).__name__}: {str(error)[:200]}", flush=True)
+        return Outcome(library, np.inf, is_verified=False, distance=-1.0, seconds=0.0)
+    outcome = Outcome(
+        library,
+        result.t_end,
+        result.verified,
+        find_smallest(move.task, result.trajectory),
+        processor_time() - busy,
+    )
+    cells = (
         move.name,
         f"{library:.4f} s",
-        verdict,
-        f"{100.0 * gain:.1f} %",
-        f"{1e3 * clear:.2f} mm",
-        f"{seconds:.1f} s",
+        f"{result.t_end:.4f} s" + ("" if result.verified else " NOT verified"),
+        f"{100.0 * outcome.gain:.1f} %",
+        f"{1e3 * outcome.distance:.2f} mm",
+        f"{outcome.seconds:.1f} s",
     )
-    print(f"({wall:.1f} s, {result.candidate.origin})", end=" ")
-    return row, gain, seconds
+    print(" | ".join(cells), flush=True)
+    return outcome
+
+
+def summarise(name: str, outcomes: list[Outcome]) -> tuple[str, ...]:
+    """Return a row of the table."""
+    gains = [outcome.gain for outcome in outcomes]
+    return (
+        name,
+        str(len(outcomes)),
+        str(sum(outcome.is_verified for outcome in outcomes)),
+        str(sum(gain < 0.0 for gain in gains)),
+        f"{100.0 * np.mean(gains):.1f} %",
+        f"{1e3 * min(outcome.distance for outcome in outcomes):.2f} mm",
+        f"{np.median([outcome.seconds for outcome in outcomes]):.1f} s",
+    )
 
 
 def main() -> None:
-    """Print a row for every move."""
+    """Print a row for every move, and a table of the robots."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robot", choices=ROBOTS)
     parser.add_argument("--seed", type=int, default=0)
@@ -325,29 +357,34 @@ def main() -> None:
     given = parser.parse_args()
     warnings.simplefilter("ignore", BrachisWarning)
     rows = []
-    gains = []
-    times = []
+    every: list[Outcome] = []
+    print("move | OMPL, timed | plan | gain | least distance | processor time")
     for robot in [given.robot] if given.robot else ROBOTS:
+        outcomes: list[Outcome] = []
         number = 0
-        planned = 0
-        while planned < given.count:
+        while len(outcomes) < given.count:
             move = draw_move(robot, given.seed, number)
             number += 1
-            if move is None:
-                continue
-            planned += 1
-            row, gain, seconds = plan_move(move, given.effort)
-            rows.append(row)
-            gains.append(gain)
-            times.append(seconds)
-            print(" | ".join(row), flush=True)
-    mean = f"{100.0 * np.mean(gains):.1f} %"
-    busy = f"{np.mean(times):.1f} s"
-    rows.append(("mean", "", "", mean, "", busy))
-    print(" | ".join(rows[-1]))
-    columns = ("move", "OMPL, timed", "plan", "gain", "least distance", "processor")
-    about = "OMPL's joint path is the fastest of eight. MuJoCo measures the distances."
-    save("Moves round bodies", columns, rows, about)
+            if move is not None:
+                outcomes.append(plan_move(move, given.effort))
+        rows.append(summarise(robot, outcomes))
+        every += outcomes
+    rows.append(summarise("all", every))
+    columns = [
+        "robot",
+        "moves",
+        "verified",
+        "slower",
+        "mean gain",
+        "least distance",
+        "processor time, median",
+    ]
+    for row in (columns, *rows):
+        print(" | ".join(row))
+    about = (
+        "Round one to five bodies, against the fastest of eight joint paths by OMPL."
+    )
+    save("Moves", columns, rows, about)
 
 
 if __name__ == "__main__":

@@ -94,11 +94,11 @@ def test_a_move_round_a_post_keeps_clear_of_it_and_is_repeatable(bench):
     moves = bench("moves")
     task = problem([POST]).task
     free = move(effort="single")
-    unaware = moves.find_smallest(task, free.trajectory)
+    unaware = moves.find_smallest(task, free.trajectory, 200)
     assert unaware < 0.0
     result = brachis.plan(task, effort="single")
     assert result.verified
-    clearance = moves.find_smallest(task, result.trajectory)
+    clearance = moves.find_smallest(task, result.trajectory, 500)
     assert 0.01 - 1e-5 <= clearance < 0.03
     again = brachis.plan(task, effort="single")
     assert again.t_end == result.t_end
@@ -113,7 +113,7 @@ def test_a_seeded_move_is_clear_and_faster_than_the_library_alone(bench, robot):
     result = brachis.plan(seeded.task, strict=False)
     assert result.verified
     assert result.t_end < 0.97 * moves.library_time(seeded)
-    assert moves.find_smallest(seeded.task, result.trajectory) > 0.01 - 1e-5
+    assert moves.find_smallest(seeded.task, result.trajectory, 500) > 0.01 - 1e-5
 
 
 def test_sampled_joint_paths_are_free_and_belong_to_their_seed():

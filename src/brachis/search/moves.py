@@ -61,7 +61,7 @@ def move_guesses(
         return [straight]
     guesses: list[InitialGuess] = []
     for seed in range(1, 1 + SCREENED * level.in_charts):
-        if deadline.passed or (seed > _TRIES and not guesses):
+        if seed > _TRIES and not guesses:
             break
         listener(f"sampling joint path {seed} round what is in the way")
         q = sample_joint_path(problem, space, seed, _SAMPLES, deadline)

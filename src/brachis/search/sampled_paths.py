@@ -71,12 +71,7 @@ def step_weights(problem: Problem) -> np.ndarray:
         problem.robot, problem.limits, problem.given_postures["start"]
     )
     weights = accelerations + _TYPICAL_TIME * velocities
-    largest = weights.max()
-    return (
-        np.maximum(weights, _LEAST_WEIGHT * largest)
-        if largest
-        else 1.0 / problem.robot.scales
-    )
+    return np.maximum(weights, _LEAST_WEIGHT * weights.max())
 
 
 def sample_joint_path(
