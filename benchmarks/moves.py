@@ -381,8 +381,10 @@ def main() -> None:
     ]
     for row in (columns, *rows):
         print(" | ".join(row))
+    _, count, verified, slower, gain, _, _ = rows[-1]
     about = (
-        "Round one to five bodies, against the fastest of eight joint paths by OMPL."
+        f"{verified} of {count} moves round one to five bodies are verified; {slower} are slower than the fastest of "
+        f"eight joint paths by OMPL, and the mean gain is {gain}."
     )
     save("Moves", columns, rows, about)
 

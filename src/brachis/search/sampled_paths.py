@@ -102,8 +102,7 @@ def sample_joint_path(
     try:
         from ompl import base, geometric, util
     except ImportError as error:
-        user = "a move round what is in the way"
-        raise NotInstalledError(user, "ompl", "moves") from error
+        raise NotInstalledError("a move round bodies", "ompl", "moves") from error
 
     weights = step_weights(problem)
     n = problem.robot.n
