@@ -38,12 +38,9 @@ class FreeSpace:
     ----------
     limits : tuple of Limit
         Limits that depend on the posture alone.
-    scales : (n,) ndarray
-        Typical motion of each joint, rad or m.
     """
 
     limits: tuple[Limit, ...]
-    scales: np.ndarray
 
     @classmethod
     def of(cls, problem: Problem) -> FreeSpace:
@@ -51,7 +48,7 @@ class FreeSpace:
         ends = np.array([problem.start, problem.end])
         limits = (limit for limit in problem.limits if limit.at_rest != "nothing")
         narrowed = tuple(limit.keep_inside(ends) for limit in limits)
-        return cls(narrowed, problem.robot.scales)
+        return cls(narrowed)
 
     def contains(self, q: np.ndarray) -> bool:
         """Tell whether all limits are met in all postures, (K, n)."""
@@ -59,7 +56,7 @@ class FreeSpace:
 
     def joins(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Tell whether the straight step between two free postures, (n,), is free."""
-        largest = np.abs((last - first) / self.scales).max()
+        largest = np.abs(last - first).max()
         q = np.linspace(first, last, 2 + int(largest / _STEP))
         inner = q[1:-1]
         return self.contains(inner[::_FEW]) and self.contains(inner)
@@ -130,20 +127,21 @@ def sample_joint_path(
     util.RNG.setSeed(seed)
     coordinates = base.RealVectorStateSpace(n)
     bounds = base.RealVectorBounds(n)
-    box = sampling_box(problem.robot, problem.given_postures["start"])
-    for joint, (low, high) in enumerate(np.transpose(box * weights).tolist()):
-        bounds.setLow(joint, low)
-        bounds.setHigh(joint, high)
+    ends = np.array([problem.start, problem.end])
+    inside = np.vstack([sampling_box(problem.robot, ends[0]), ends]) * weights
+    for joint, positions in enumerate(inside.T.tolist()):
+        bounds.setLow(joint, min(positions))
+        bounds.setHigh(joint, max(positions))
     coordinates.setBounds(bounds)
     setup = geometric.SimpleSetup(coordinates)
     information = setup.getSpaceInformation()
     setup.setStateValidityChecker(lambda state: space.contains(posture(state)[None]))
     validator = StepValidator(information)
     information.setMotionValidator(validator)
-    ends = coordinates.allocState(), coordinates.allocState()
-    for state, q in zip(ends, (problem.start, problem.end), strict=True):
+    states = coordinates.allocState(), coordinates.allocState()
+    for state, q in zip(states, ends, strict=True):
         state[0:n] = (q * weights).tolist()
-    setup.setStartAndGoalStates(*ends)
+    setup.setStartAndGoalStates(*states)
     setup.setPlanner(geometric.RRTConnect(information))
     setup.solve(base.PlannerTerminationCondition(is_over))
     if not setup.haveExactSolutionPath():
