@@ -18,7 +18,7 @@ from brachis.search.screening import screen_coarsely
 from brachis.search.stages import InitialGuess
 
 _SAMPLES = 3000
-"""Number of samples after which OMPL gives up. The hardest of 30 moves needed 1500."""
+"""Number of samples after which OMPL gives up. For an iiwa14 behind walls, they take 1.5 s."""
 _TRIES = 3
 """Number of times that OMPL may give up before there is no joint path."""
 _STATIONS = 97
