@@ -6,8 +6,9 @@ the limits of the postures at which it ends. The best chains are improved as a w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from brachis.problem.problem import Decomposition, Decompositions, Problem
 from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_charts
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import step_lengths
-from brachis.search.moves import guess_along
+from brachis.search.moves import move_guesses
 from brachis.search.order import find_orders
 from brachis.search.schedule import Batch, batches, has_charts
 from brachis.search.screening import screen
@@ -31,6 +32,8 @@ _SHARE = 0.4
 """Fraction of the remaining time in which the joint paths of all paths are sought."""
 _NODES = 8
 """Number of joint paths of each path among which the best order is sought."""
+_TRIED = 6
+"""Number of chains after which none is passable."""
 _SCREENED = 3
 """Number of chains that are improved for each one that is kept."""
 
@@ -104,6 +107,11 @@ class _ChainSearch:
     deadline: Deadline
     listener: Listener
 
+    @property
+    def _level_of_moves(self) -> SearchLevel:
+        """Level at which joint paths of moves round obstacles are sought."""
+        return replace(self.level, in_charts=1)
+
     def best_guesses(self) -> list[ChainGuess]:
         """Return guesses of the whole program, the fastest first."""
         if self.problem.task.order == "free":
@@ -127,10 +135,26 @@ class _ChainSearch:
         order = [*range(first, len(parts)), *range(first)]
         chains = self._extend(chains, order)
         chains = sorted(chains, key=lambda chain: chain.time)
-        return [
-            self.guess_of(chain, order)
-            for chain in chains[: _SCREENED * self.level.in_charts]
-        ]
+        return self._passable(partial(self.guess_of, order=order), chains)
+
+    def _passable(
+        self, guess_of: Callable[[_Chain], ChainGuess], chains: Sequence[_Chain]
+    ) -> list[ChainGuess]:
+        """Return the guesses of the best chains whose moves get round what is in their way."""
+        found: list[ChainGuess] = []
+        blocked: list[PathError] = []
+        for chain in chains:
+            if len(found) == _SCREENED * self.level.in_charts:
+                break
+            if len(blocked) == _TRIED and not found:
+                break
+            try:
+                found.append(guess_of(chain))
+            except PathError as error:
+                blocked.append(error)
+        if not found:
+            raise blocked[0]
+        return found
 
     def _guesses_in_any_order(self) -> list[ChainGuess]:
         """Return guesses of the whole program in the best orders of its paths, the fastest first."""
@@ -170,22 +194,26 @@ class _ChainSearch:
             last = zeros if end is None else price_moves(move, ends, end)
             found = find_orders(prices, first, last, groups, count)
         found.sort(key=lambda way: way[0])
-        return [
-            self._guess_in_order(time, [nodes[node] for node in way])
-            for time, way in found[:count]
+        chains = [
+            _Chain(tuple(nodes[node][1] for node in way), time) for time, way in found
         ]
+        orders = {
+            id(chain): [nodes[node][0] for node in way]
+            for chain, (_, way) in zip(chains, found, strict=True)
+        }
+        return self._passable(
+            lambda chain: self._guess_in_order(chain, orders[id(chain)]), chains
+        )
 
-    def _guess_in_order(
-        self, time: float, visited: Sequence[tuple[int, _Option]]
-    ) -> ChainGuess:
-        """Return the guess of the program with its paths in an order."""
+    def _guess_in_order(self, chain: _Chain, visited: Sequence[int]) -> ChainGuess:
+        """Return the guess of the program with its paths, given by their numbers, in an order."""
         problem = self.problem
-        paths = iter(number for number, _ in visited)
+        paths = iter(visited)
         order = [
             next(paths) if part.task_map.m else number
             for number, part in enumerate(problem.parts)
         ]
-        options = [option for _, option in visited]
+        options = list(chain.options)
         if problem.start is not None:
             options.insert(0, _Option(np.array([problem.start] * 2)))
         if problem.end is not None:
@@ -193,7 +221,7 @@ class _ChainSearch:
         elif problem.is_closed:
             options.append(_Option(options[0].ends[[0, 0]]))
         search = replace(self, problem=problem.reordered(order))
-        return search.guess_of(_Chain(tuple(options), time), range(len(order)))
+        return search.guess_of(_Chain(tuple(options), chain.time), range(len(order)))
 
     def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
         """Continue chains with parts, given by their numbers."""
@@ -297,7 +325,7 @@ class _ChainSearch:
         )
 
     def guess_of(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
-        """Return the guess of a chain, with straight joint lines as moves."""
+        """Return the guess of a chain; raise PathError if no move gets round what is in its way."""
         options = list(chain.options)
         guesses: dict[int, InitialGuess] = {}
         here = None if self.problem.start is None else options.pop(0).ends[-1]
@@ -309,8 +337,10 @@ class _ChainSearch:
                 guesses[number] = option.guess
             else:
                 assert here is not None
-                postures = np.array([here, option.ends[0]])
-                guesses[number] = guess_along(part, postures, "line")
+                move = replace(part, start=here, end=option.ends[0])
+                known = (self._level_of_moves, self.deadline, self.listener)
+                guess = move_guesses(move, *known)[0]
+                guesses[number] = replace(guess, problem=part)
             if part.task_map.m or option.guess is None:
                 options.pop(0)
             here = option.ends[-1] if part.task_map.m else option.ends[0]
