@@ -5,7 +5,7 @@ Successive paths with the same settings form one path with stops, and so do a pa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,9 +60,8 @@ def bind_task(
     for way, *postures in zip(ways, begins, ends, strict=True):
         changed = _robot_of(robot, way)
         before = problems[-1].path if problems else None
-        part_task = _task_of(way, changed, task, before)
         stated = dict(zip(("start", "end"), postures, strict=True))
-        part_task = part_task.model_copy(update=stated)
+        part_task = _task_of(way, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
         problems.append(problem)
         sections.append(list(_sections(way, problem)))
@@ -162,14 +161,20 @@ def _robot_of(robot: Robot, way: _Way) -> Robot:
     return robot
 
 
-def _task_of(way: _Way, robot: Robot, task: Task, before: Path | None) -> Task:
-    """Return the task of a way with free ends. `before` is the path of the way before."""
+def _task_of(
+    way: _Way,
+    robot: Robot,
+    task: Task,
+    before: Path | None,
+    stated: Mapping[str, Posture | str],
+) -> Task:
+    """Return the task of a way. `before` is the path of the way before, `stated` are the postures at both ends."""
     limited = way.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
+        "order": "given",
         "robot": robot.settings,
-        "start": "free",
-        "end": "free",
+        **stated,
         "tool_limits": limited.tool_limits or task.tool_limits,
     }
     if isinstance(limited, MovePart):
@@ -180,10 +185,11 @@ def _task_of(way: _Way, robot: Robot, task: Task, before: Path | None) -> Task:
     changes["path"] = (*segments[:-1], ending)
     if changes["path_start"] is None and before is not None and before.positions:
         changes["path_start"] = _pose(before, 1.0)
-    plain = task.model_copy(update=changes)
     approaches = way.of(ApproachPart)
     retracts = way.of(RetractPart)
     if approaches or retracts:
+        free = {"end": "free", "start": "free" if approaches else stated["start"]}
+        plain = task.model_copy(update=changes | free)
         _, task_map = bind(robot, plain.task_space, plain.tolerances)
         path = path_of(task_map, validate(Task, plain, way.key))
         if approaches:
