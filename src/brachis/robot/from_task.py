@@ -76,7 +76,7 @@ def robot_from_settings(
     return Robot.from_settings(named, str(path), urdf_text)
 
 
-_FRAMES = ("tool_frame", "base_frame", "locked_joints")
+_FRAMES = ("tool_frame", "base_frame", "workpiece_frame", "locked_joints")
 """Settings that determine the joints of the chain."""
 _PER_JOINT: dict[str, object] = {
     **{
@@ -199,6 +199,7 @@ def _combine(
         frames.get("tool_frame"),
         frames.get("base_frame"),
         tuple(frames.get("locked_joints", {}).items()),
+        frames.get("workpiece_frame"),
     )
     if "limits" in written:
         moving = without_joints(task_settings.limits, chain.locked)

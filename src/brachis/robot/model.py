@@ -52,11 +52,11 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             frame.name = frame.name.removeprefix(LINK)
     model.gravity.linear = np.array(settings.gravity)
     model.armature = np.zeros(model.nv)
-    mounting = _se3(settings.mounting)
-    model.jointPlacements[1] = mounting * model.jointPlacements[1]
+    base = _se3(settings.base_placement)
+    model.jointPlacements[1] = base * model.jointPlacements[1]
     for frame in list(model.frames)[1:]:  # the first one is the world itself
         if frame.parentJoint == 0:
-            frame.placement = mounting * frame.placement
+            frame.placement = base * frame.placement
     tool = model.frames[model.getFrameId(chain.tool_frame, pin.FrameType.BODY)]
     if settings.payload is not None:
         inertia = _inertia(settings.payload)
