@@ -111,7 +111,7 @@ def _draw_postures(robot: Robot) -> np.ndarray:
     return np.where((rounded > lower) & (rounded < upper), rounded, drawn)
 
 
-def _heights(robot: Robot, q: np.ndarray) -> np.ndarray:
+def heights(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return the heights of the tool frame above the plane on which the robot stands, (K,) m, for postures (K, n).
 
     The plane contains the origin of the base frame. Its normal is the z axis of the URDF's root link.
@@ -147,7 +147,7 @@ def _quality(
         limits = robot.limits
         shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
         quality[shares.max(axis=1) >= 0.7] = 0.0
-    quality[_heights(robot, postures) < lowest] = 0.0
+    quality[heights(robot, postures) < lowest] = 0.0
     return quality
 
 

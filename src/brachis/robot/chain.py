@@ -66,8 +66,7 @@ def chain_in_world(
     """
     data = model.createData()
     pin.forwardKinematics(model, data, np.zeros(model.nq))
-    joint, placement = world
-    seen = (data.oMi[joint] * pin.SE3(placement)).inverse()
+    seen = path_frame_in_world(data, world)
     bodies = _bodies(model, data)
     del bodies[carriers]  # the world
     bodies = [seen.act(body) for body in bodies]
@@ -81,6 +80,12 @@ def chain_in_world(
         centers=np.array([body.lever for body in bodies]),
         inertias=_inertias(bodies),
     )
+
+
+def path_frame_in_world(data: pin.Data, world: tuple[int, np.ndarray]) -> pin.SE3:
+    """Return the placement in the world of the frame of the paths, for placed joints and `Robot.world`."""
+    joint, placement = world
+    return (data.oMi[joint] * pin.SE3(placement)).inverse()
 
 
 def _bodies(model: pin.Model, data: pin.Data) -> list[pin.Inertia]:

@@ -181,7 +181,7 @@ def read_chain(
     Raises
     ------
     UrdfError
-        The text is broken, both `base_frame` and `workpiece_frame` are given, the chain has an unsupported joint, or the
+        The text is broken, `base_frame` is given with `workpiece_frame`, the chain has an unsupported joint, or the
         inertia of a moving link is not physical.
     UnknownNameError
         A frame or joint does not exist.
