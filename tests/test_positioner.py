@@ -8,10 +8,11 @@ import pytest
 
 import brachis
 from brachis.errors import PathError
-from brachis.robot import bind
+from brachis.robot import bind, dynamics
 from brachis.robot.chain import path_frame_in_world
 
-EXAMPLE = Path(__file__).parents[1] / "examples/20_positioner.yaml"
+ROBOTS = Path(__file__).parents[1] / "robots"
+EXAMPLE = ROBOTS.parent / "examples/20_positioner.yaml"
 FLAT = -0.5 * np.pi
 """Tilt at which the tube lies flat: position 1G."""
 
@@ -79,6 +80,36 @@ def test_a_saved_motion_is_verified_for_the_whole_cell(tmp_path):
     (torque,) = [check for check in checks if check.name == "torque ratio"]
     assert not torque.passed
     assert torque.subject in ("turn", "tilt")
+
+
+GUN = """<link name="gun"/><joint name="stand" type="fixed"><parent link="base_link"/><child link="gun"/>
+<origin xyz="0.7 0.1 0.7" rpy="0 3.14159265 0"/></joint></robot>"""
+
+
+def test_an_arm_moves_the_workpiece_under_a_fixed_tool():
+    text = (ROBOTS / "tx90l_rail/arm.urdf").read_text().replace("</robot>", GUN)
+    robot = brachis.Robot.from_urdf(
+        "arm.urdf", urdf_text=text, workpiece_frame="tool", tool_frame="gun"
+    )
+    result = brachis.plan(
+        robot,
+        start="free",
+        path_start={"position": [0.1, 0.0, 0.05], "rpy_deg": [180, 0, 0]},
+        path=[brachis.Circle(center=[0.0, 0.0, 0.05], normal=[0, 0, 1])],
+        task_space="pose_free_roll",
+        intervals=12,
+        effort="single",
+    )
+    assert result.verified
+    trajectory = result.trajectory
+    arm = brachis.Robot.from_urdf("arm.urdf", urdf_text=text, tool_frame="tool")
+    # Backwards through the chain, the torques are those of the same arm.
+    t = np.linspace(0.0, trajectory.t_end, 20)
+    curves = (trajectory.position, trajectory.velocity, trajectory.acceleration)
+    states = [curve(t)[:, 5::-1] for curve in curves]
+    np.testing.assert_allclose(
+        trajectory.torque(t)[:, 5::-1], dynamics.torque(arm, *states), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("joints", [["turn", "tilt"], ["turn", "joint_1"]])

@@ -262,6 +262,8 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
             used[name] = (
                 f"at {_vector(placement.xyz)} m, roll, pitch, yaw {_vector(placement.rpy_deg)} deg"
             )
+    if settings.workpiece_frame is not None:
+        used["paths"] = f"in the frame of {settings.workpiece_frame}"
     used["gravity"] = f"{_vector(robot.model.gravity.linear)} m/s^2"
     if settings.speed_override != 1.0:
         used["speed override"] = (
