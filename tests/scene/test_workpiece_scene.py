@@ -122,31 +122,3 @@ def test_derivatives_of_distances(cell):
         slopes = (values(postures + step) - values(postures - step)) / 2e-6
         error = np.abs(slopes - exact[:, :, joint])[clear]
         assert np.quantile(error, 0.98) < 1e-4
-
-
-def test_a_planned_motion_keeps_clear_of_a_body_in_the_world():
-    pose = {"position": [0.07, 0.0, 0.2], "rpy_deg": [0, -90, 0]}
-    circle = {
-        "circle": {"center": [0, 0, 0.2], "normal": [0, 0, 1]},
-        "orientation": {"rotate": {"axis": [0, 0, 1], "angle_deg": 360}},
-    }
-    options = {
-        "robot": {
-            "urdf": "tx90l_positioner",
-            "workpiece_frame": "workpiece",
-            "tool_offset": {"xyz": [0, 0, 0.15]},
-            "locked_joints": {"tilt": 0.0},
-        },
-        "path_start": pose,
-        "path": [circle],
-        "scene": [*BODIES[:2]],
-        "collisions": {"clearance": 0.01},
-        "spline": {"intervals": 16},
-        "search": {"effort": "single"},
-    }
-    result = brachis.plan(task(**options))
-    assert result.verified
-    (check,) = [
-        check for check in result.verification.checks if check.name == "clearance ratio"
-    ]
-    assert check.passed
