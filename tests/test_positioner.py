@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.errors import PathError
+from brachis.errors import InputError, PathError
 from brachis.robot import bind, dynamics
 from brachis.robot.chain import path_frame_in_world
 
@@ -111,6 +111,8 @@ def test_an_arm_moves_the_workpiece_under_a_fixed_tool():
     robot = brachis.Robot.from_urdf(
         "arm.urdf", urdf_text=text, workpiece_frame="tool", tool_frame="gun"
     )
+    with pytest.raises(InputError, match="a payload has no effect"):
+        robot.with_payload(1.0)
     result = brachis.plan(
         robot,
         start="free",
