@@ -166,8 +166,8 @@ class Search:
         PlanningError
             A given speed, or a limit on the mean of a load, is far out of reach.
         """
-        guess_batches = self._find_guesses(motion, exact)
-        for batch in itertools.islice(guess_batches, max_batches):
+        found = self._find_guesses(motion, exact)
+        for batch in itertools.islice(found, max_batches):
             if self._deadline.left < LITTLE_TIME and not self._ranked:
                 soon = self._deadline.part(_FIRST_SHARE)
                 self._find_first_motion(batch.guesses, soon)
@@ -199,8 +199,9 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        where = (self._problem, self._decompositions)
-        for batch in find_batches(*where, self._latest, self._listener):
+        for batch in find_batches(
+            self._problem, self._decompositions, self._latest, self._listener
+        ):
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
@@ -332,9 +333,8 @@ class Search:
         if failure is not None:
             return failure
         # The time limit of the search may have ended every solve before the solve's own time limit.
-        last = [
-            candidate.reports[-1] for candidate in self.candidates if candidate.reports
-        ]
+        tried = [candidate for candidate in self.candidates if candidate.reports]
+        last = [candidate.reports[-1] for candidate in tried]
         self.interrupted |= bool(last) and all(
             report.status is SolveStatus.TIME_LIMIT
             and report.wall_time < self._problem.task.solver.time_limit

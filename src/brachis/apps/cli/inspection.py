@@ -367,7 +367,7 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             if (lower, upper) == (-float("inf"), float("inf")):
                 text = _NONE
             row[key] = text
-        mass = robot.model.inertias[i + 1].mass
+        mass = robot.dynamic_chain.masses[i]
         row["mass"] = f"{mass:.4g} kg" if mass else _NONE
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]
