@@ -35,6 +35,8 @@ def describe_motion(
         "redundant_joints": list(trajectory.redundant_joints),
         "branch": trajectory.branch,
         "phases": [phase.to_dict() for phase in trajectory.phases],
+        "parts": [part.to_dict() for part in trajectory.parts],
+        "events": [asdict(event) for event in trajectory.events],
         "joint_names": list(trajectory.joint_names),
         "verified": verification.passed,
         "worst_ratio": verification.worst_ratio,
@@ -122,6 +124,13 @@ class PlannedMotion(Summary):
     def fits(self) -> tuple[FitReport, ...]:
         """How close the path is to the points that it was fitted to, with one report for each file or array."""
         return self.task.fits
+
+    @property
+    def smoothing(self) -> str:
+        """The outcome of the search for the smoothest motion, in words."""
+        if self.least_motion is not None:
+            return self.least_motion.status
+        return "not for programs" if self.trajectory.parts else "off"
 
     @property
     def solver_report(self) -> SolverReport:

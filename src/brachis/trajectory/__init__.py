@@ -8,7 +8,16 @@ from brachis.trajectory.phases import (
     phase_rows,
 )
 from brachis.trajectory.pieces import Pieces
-from brachis.trajectory.program import Event, MotionPart
+from brachis.trajectory.program import (
+    PART_COLUMNS,
+    Event,
+    MotionPart,
+    change_robots,
+    part_rows,
+    phase_table,
+    split_times,
+    torques_of,
+)
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
 from brachis.trajectory.trajectory import (
@@ -21,6 +30,7 @@ from brachis.trajectory.trajectory import (
 
 __all__ = [
     "CONTINUOUS_TORQUE",
+    "PART_COLUMNS",
     "PHASE_COLUMNS",
     "Event",
     "MotionPart",
@@ -31,8 +41,13 @@ __all__ = [
     "Recovered",
     "Samples",
     "Trajectory",
+    "change_robots",
     "join_splines",
     "motion_of",
     "of_motion",
+    "part_rows",
     "phase_rows",
+    "phase_table",
+    "split_times",
+    "torques_of",
 ]

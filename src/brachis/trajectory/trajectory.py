@@ -21,11 +21,18 @@ from brachis.common.summary import Summary
 from brachis.common.words import write_apart, write_count
 from brachis.errors import InputError, UnknownNameError
 from brachis.kernel import Spline
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
 from brachis.task import Task
 from brachis.trajectory.phases import MotionPhase, PhaseSpline, find_phase_knots
 from brachis.trajectory.pieces import Pieces, piece_coefficients
-from brachis.trajectory.program import Event, MotionPart
+from brachis.trajectory.program import (
+    Event,
+    MotionPart,
+    name_redundancy,
+    summarise_program,
+    torques_at,
+    with_given_speeds,
+)
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
@@ -89,8 +96,7 @@ class Trajectory(Summary):
     events : tuple of Event
         The events of a program, in the order of their times.
     components : tuple of (float, Trajectory)
-        The motions of which the motion of a program consists, each with the time at which it begins, s. Each has its
-        own task.
+        The motions that make up the motion of a program, each with its own task and the time at which it begins, s.
 
     Examples
     --------
@@ -146,6 +152,8 @@ class Trajectory(Summary):
     @property
     def redundancy(self) -> str:
         """The redundant joints in words or, for a chart, the number of its coordinates of the self-motion."""
+        if self.components:
+            return name_redundancy(self)
         if self.redundant_joints or not self.chart_rows.size:
             return ", ".join(self.redundant_joints) or "none"
         return (
@@ -227,7 +235,7 @@ class Trajectory(Summary):
             )
             kind = next(matching, (None, is_dwell))
             phases.append(MotionPhase(begin, end, *s, *kind))
-        return tuple(phases)
+        return with_given_speeds(self, phases)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Return the path coordinate s at times `t`, in the same shape."""
@@ -261,8 +269,9 @@ class Trajectory(Summary):
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Return joint torques, Nm or N, in the shape of `position`; UrdfError if the URDF has no masses."""
-        motion = self.at(t)
-        tau = dynamics.torque(self.robot, motion.q, motion.qdot, motion.qddot)
+        self.robot.check_masses("torques")
+        tau = self.at(t).tau
+        assert tau is not None
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:
@@ -281,7 +290,7 @@ class Trajectory(Summary):
             qdot[-1] = 0.0
             qddot[-1] = 0.0
         robot = self.robot
-        tau = dynamics.torque(robot, q, qdot, qddot) if robot.has_masses else None
+        tau = torques_at(self, within, q, qdot, qddot) if robot.has_masses else None
         tool = tool_motion(self.robot, q, qdot)
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
 
@@ -350,18 +359,19 @@ class Trajectory(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user."""
-        source = Path(self.robot.source)
+        no_branch = len(self.chart_rows) or self.components
         intervals = write_count(len(np.unique(self.knots)) - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
-            "robot": Path(*source.parts[-2:]).as_posix(),
+            "robot": Path(*Path(self.robot.source).parts[-2:]).as_posix(),
             "joints": ", ".join(self.joint_names),
             "redundant joints": self.redundancy,
-            **({} if len(self.chart_rows) else {"branch": self.branch or "none"}),
+            **({} if no_branch else {"branch": self.branch or "none"}),
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {intervals}",
+            **summarise_program(self),
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -21,6 +21,7 @@ from brachis.apps.controller.run import (
     check_period,
     nearest_on_path,
     verify_run,
+    with_profile,
 )
 
 __all__ = [
@@ -38,5 +39,6 @@ __all__ = [
     "robot_with_profile",
     "scale_of",
     "verify_run",
+    "with_profile",
     "without_scale",
 ]

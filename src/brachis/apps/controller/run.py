@@ -16,27 +16,28 @@ from typing import Any
 import numpy as np
 
 from brachis.apps.controller.axes import ControllerAxes, bind_axes
+from brachis.apps.controller.differences import check_differences, check_tool_speed
 from brachis.apps.controller.limits import robot_with_profile, without_scale
 from brachis.apps.controller.profile import Profile, load_profile
 from brachis.common.arrays import spread
 from brachis.common.summary import Summary
 from brachis.errors import InputError
 from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskMap, bind, dynamics
+from brachis.robot import TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.trajectory import (
     MotionSource,
     Samples,
     Trajectory,
+    change_robots,
     join_splines,
     motion_of,
 )
 from brachis.verify import Check, Verification, VerifyOptions
 from brachis.verify.limits import check_limits
-from brachis.verify.limits.tool import largest_speeds
 from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion, MotionStates
-from brachis.verify.verify import path_errors
+from brachis.verify.verify import path_errors, place_in_program
 
 _MOVING = 1e-6
 """Joint velocity below which an end of a motion counts as at rest, rad/s or m/s."""
@@ -148,11 +149,21 @@ def verify_run(
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
     period = check_period(profile, period)
-    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-    run = _Run(motion, profile, axes, robot, tuple(own_limits))
+    motion = with_profile(motion, profile, axes)
+    run = _Run(motion, profile, axes, tuple(own_limits))
     verification = run.verify(period)
     remedies = () if verification.passed else tuple(_find_remedies(run, period))
     return RunReport(profile.title, period, verification, remedies)
+
+
+def with_profile(
+    motion: Trajectory, profile: Profile, axes: ControllerAxes
+) -> Trajectory:
+    """Return a motion whose robots have the limits of a profile too, without the factors on their limits."""
+    return change_robots(
+        motion,
+        lambda robot: robot_with_profile(without_scale(robot), profile, axes),
+    )
 
 
 def check_period(profile: Profile, period: float | None) -> float:
@@ -216,7 +227,6 @@ class _Run:
     motion: Trajectory
     profile: Profile
     axes: ControllerAxes
-    robot: Robot
     own_limits: tuple[LimitModel, ...]
 
     def verify(self, period: float) -> Verification:
@@ -227,8 +237,47 @@ class _Run:
             values = np.round(self.axes.encode(q), self.profile.decimals)
             q[:, self.axes.index] = self.axes.decode(values)
         run = interpolate(self.motion, samples, q, self.profile.interpolation)
+        worst: dict[str, Check] = {}
+        points = 0
+        for begin, part, sampled in self._split(run):
+            checks, count = self._check(part, sampled)
+            points += count
+            for check in checks:
+                before = worst.get(check.name)
+                if before is None or check.share > before.share:
+                    worst[check.name] = place_in_program(run, begin, check)
+        worst |= {check.name: check for check in _check_rest(self.motion, self.profile)}
+        ratios = (check.value for check in worst.values() if check.of_limit)
+        error = worst["path error"].value
+        return Verification(
+            tuple(worst.values()), points, max(ratios, default=0.0), error
+        )
+
+    def _split(self, run: Trajectory) -> Iterator[tuple[float, Trajectory, Trajectory]]:
+        """Yield the run, or that of each component, with the time at which it begins, s, and the samples around it.
+
+        The run of a component begins and ends where the plan rests. Samples closer than half a period are left out.
+        """
+        if not run.components:
+            yield 0.0, run, run
+        for begin, component in run.components:
+            t = run.times - begin
+            half = 0.5 * run.times[1]
+            inside = (t > half) & (t < component.t_end - half)
+            times = np.concatenate([[0.0], t[inside], [component.t_end]])
+            samples = component.at(times)
+            q = samples.q.copy()
+            q[1:-1, : run.q.shape[1]] = run.q[inside]
+            part = interpolate(component, samples, q, self.profile.interpolation)
+            ends = (-2.0 * half, component.t_end + 2.0 * half)
+            around = slice(*np.searchsorted(t, ends))
+            rows = {name: getattr(run, name)[around] for name in ("q", "qdot", "qddot")}
+            yield begin, part, replace(run, times=t[around], **rows)
+
+    def _check(self, run: Trajectory, sampled: Trajectory) -> tuple[list[Check], int]:
+        """Check a run, and its samples by differences; return the number of instants too."""
         task = run.task
-        robot, task_map = bind(self.robot, task.task_space, task.tolerances)
+        robot, task_map = bind(run.robot, task.task_space, task.tolerances)
         path = path_of(task_map, task)
         options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
         allowed = 1.0 + options.ratio_tolerance
@@ -236,8 +285,8 @@ class _Run:
         kind = CheckedMotion
         if self.profile.is_sampled:
             differences = [
-                *_check_differences(robot, run, allowed),
-                *_check_tool_speed(robot, run, allowed),
+                *check_differences(robot, sampled, allowed),
+                *check_tool_speed(run, sampled, allowed),
             ]
             kind = _SampledMotion
         checked = kind(run, robot, task_map, path, options)
@@ -246,10 +295,7 @@ class _Run:
         }
         limits = check_limits(checked, self.own_limits)
         ratios = [check for check in limits if check.name not in replaced] + differences
-        path_check = _check_path(checked, self.profile)
-        checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
-        worst = max((check.value for check in ratios), default=0.0)
-        return Verification(checks, len(checked.states.t), worst, path_check.value)
+        return [_check_path(checked, self.profile), *ratios], len(checked.states.t)
 
 
 class _SampledMotion(CheckedMotion):
@@ -362,64 +408,13 @@ def nearest_on_path(
 
     The search begins at `s`, (K,), close to them.
     """
-    for _ in range(2):
+    for _ in range(2 if values.size else 0):
         sample = path.sample(s)
         miss = task_map.difference(values, sample.target)
         along = sample.xi
         shift = np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
         s = np.clip(s + shift, 0.0, 1.0)
     return s
-
-
-def _check_differences(
-    robot: Robot, run: Trajectory, allowed: float
-) -> Iterator[Check]:
-    """Check the differences of successive samples, divided by the period, as controllers do."""
-    period = run.times[1]
-    quantities = {
-        "velocity": (run.q, 1),
-        "acceleration": (run.q, 2),
-        "jerk": (run.q, 3),
-    }
-    if robot.has_masses:
-        torques = dynamics.torque(robot, run.q, run.qdot, run.qddot)
-        quantities["torque_rate"] = (torques, 1)
-    for kind, (values, order) in quantities.items():
-        lower, upper = robot.limits.both_ways(kind)
-        if not np.isfinite(upper).any():
-            continue
-        # The controller holds the first position before the motion, and the last one after it.
-        held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
-        rates = np.diff(held, order, axis=0) / period**order
-        ratios = np.maximum(rates / upper, rates / lower)
-        row, joint = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
-        time = run.times[min(max(row - order + 2, 0), len(run.times) - 1)]
-        name = f"{kind.replace('_', ' ')} by differences"
-        subject = robot.joint_names[joint]
-        ratio = ratios[row, joint]
-        yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
-    limit = robot.limits.rms_torque
-    if np.isfinite(limit).any():
-        ratios = np.sqrt(np.mean(torques**2, axis=0)) / limit
-        joint = int(np.argmax(ratios))
-        subject = robot.joint_names[joint]
-        name = "rms torque by differences"
-        yield Check(name, ratios[joint], allowed, "-", subject, of_limit=True)
-
-
-def _check_tool_speed(robot: Robot, run: Trajectory, allowed: float) -> Iterator[Check]:
-    """Check the distances between tool positions at successive samples, divided by the period."""
-    s = run.path_coordinate(run.times)
-    largest = largest_speeds(run.task, s, np.maximum)
-    if np.isinf(largest).all():
-        return
-    places, _ = robot.tool_placements(robot.of_real_joints(run.q))
-    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / run.times[1]
-    ratios = speeds / np.maximum(largest[1:], largest[:-1])
-    row = int(np.argmax(ratios))
-    name = "tool speed by differences"
-    time = run.times[row]
-    yield Check(name, ratios[row], allowed, "-", "tool", time, of_limit=True)
 
 
 def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
@@ -462,8 +457,13 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
 
 def slow_down(motion: Trajectory, factor: float) -> Trajectory:
     """Return the motion slowed down by a factor on its duration."""
+    components = tuple(
+        (factor * begin, slow_down(component, factor))
+        for begin, component in motion.components
+    )
     return replace(
         motion,
+        components=components,
         times=motion.times * factor,
         qdot=motion.qdot / factor,
         qddot=motion.qddot / factor**2,

@@ -18,9 +18,8 @@ from brachis.apps.controller import (
     axes_for,
     check_period,
     load_profile,
-    robot_with_profile,
     verify_run,
-    without_scale,
+    with_profile,
 )
 from brachis.apps.export.formats import FORMATS
 from brachis.apps.export.programs import ProgramReport, write_program
@@ -110,8 +109,8 @@ def write_for_controller(
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
-        robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-        verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
+        limited = with_profile(motion, profile, axes)
+        verification = verify_trajectory(limited, own_limits=own_limits)
         _warn(profile, verification.failures)
         return replace(report, failures=verification.failures)
     if moves != "joint":
@@ -192,4 +191,14 @@ def _rows_of(
         tau=None if samples.tau is None else axes.encode_torques(samples.tau),
     )
     end = motion.t_end
-    return JointRows(axes.names, axes.units, (), end, period, changed, profile.columns)
+    return JointRows(
+        axes.names,
+        axes.units,
+        (),
+        end,
+        period,
+        changed,
+        profile.columns,
+        motion.parts,
+        motion.events,
+    )

@@ -9,7 +9,7 @@ speeds up or slows down over `BLEND` times the time of the line.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller import ControllerAxes, Profile, nearest_on_path
+from brachis.apps.controller import ControllerAxes, Profile
+from brachis.apps.export.deviation import Way
 from brachis.apps.export.rows import require_library
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
-from brachis.path import path_of
-from brachis.robot import Robot, bind
-from brachis.trajectory import Trajectory
+from brachis.robot import Robot
+from brachis.trajectory import Trajectory, split_times
 
 BLEND = 0.25
 """Half of the duration of the parabola at a corner, as a fraction of the shorter neighbouring time."""
@@ -42,10 +42,10 @@ _NEWTON_STEPS = 4
 """Number of Newton iterations in each of these steps."""
 _SAME_POSTURE = 1e-3
 """Maximum difference between the joints of two postures that count as the same, rad."""
+_SAME_TIME = 1e-6
+"""Difference between an event and the end of a phase below which they are at the same time, s."""
 _REST = 1e-6
 """Joint velocity below which the arm counts as at rest, rad/s or m/s."""
-_SLOW = 1e-3
-"""Path velocity, as a fraction of the mean path velocity, below which times are not compared."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,8 +129,8 @@ def write_program(
             found=", ".join(axes.names),
             allowed="only the joints of the arm",
         )
-    events = dict(_events(motion, profile))
-    follower = _Follower(motion, is_linear=moves == "linear")
+    events = _events(motion, profile)
+    follower = _Follower(motion, list(events), is_linear=moves == "linear")
     if follower.is_linear:
         follower.check_arm(axes)
     nodes, place, time = follower.choose_within(tolerance, time_tolerance)
@@ -210,22 +210,32 @@ def _largest_velocities(robot: Robot) -> np.ndarray:
 class _Follower:
     """Comparison of a motion with straight lines between its positions.
 
+    Parameters
+    ----------
+    motion : Trajectory
+    stations : sequence of float
+        Times at which there must be a position, s.
+    is_linear : bool
+
     Attributes
     ----------
     t : (K,) ndarray
         Times of the comparison, s.
     """
 
-    def __init__(self, motion: Trajectory, *, is_linear: bool) -> None:
-        task = motion.task
-        _, self.task_map = bind(motion.robot, task.task_space, task.tolerances)
-        self.path = path_of(self.task_map, task)
+    def __init__(
+        self, motion: Trajectory, stations: Sequence[float], *, is_linear: bool
+    ) -> None:
+        even = np.linspace(0.0, motion.t_end, _POINTS)
+        self.stations = np.union1d(motion.phase_ends, stations)
+        self.t = np.union1d(even, self.stations)
+        self.ways = [
+            Way.of(component, t) for component, _, t in split_times(motion, self.t)
+        ]
+        self.task_map = self.ways[0].task_map
         self.motion = motion
         self.is_linear = is_linear
-        even = np.linspace(0.0, motion.t_end, _POINTS)
-        self.t = np.union1d(even, motion.phase_ends)
         self.q = motion.position(self.t)
-        self.s = motion.path_coordinate(self.t)
         self.followed = self.task_map.values(self.q) if is_linear else self.q
         self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
 
@@ -265,7 +275,7 @@ class _Follower:
             return place <= tolerance and time <= time_tolerance
 
         nodes = [0]
-        for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
+        for end in np.searchsorted(self.t, self.stations).tolist():
             while nodes[-1] < end and len(nodes) <= _MOST:
                 first = nodes[-1]
                 # A longer line may fit where a shorter one does not, so the search begins far away.
@@ -285,15 +295,25 @@ class _Follower:
         """Return the largest deviations from the path, m or rad, and from the motion's timing, s, at times (k,)."""
         rests = self.rests[nodes]
         values = nominal(self.t[nodes], self.followed[nodes], rests, t)
-        if not self.is_linear:
-            values = self.task_map.values(values)
-        planned = self.motion.path_coordinate(t)
-        s = nearest_on_path(self.path, self.task_map, values, planned)
-        miss = self.task_map.difference(values, self.path.sample(s).target)
-        moves = np.append(True, np.diff(self.s) > 0.0)
-        late = np.abs(np.interp(s, self.s[moves], self.t[moves]) - t)
-        fast = self.motion.path_spline(t, nu=1) > _SLOW / self.motion.t_end
-        return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
+        place = 0.0
+        time = 0.0
+        pieces = split_times(self.motion, t)
+        for way, (component, rows, times) in zip(self.ways, pieces, strict=True):
+            if not len(rows):
+                continue
+            part = values[rows]
+            if not self.is_linear:
+                virtual = component.position(times)[:, part.shape[1] :]
+                part = np.hstack([part, virtual])
+            if not way.task_map.m:
+                deviations = way.deviate_from_joints(part, times)
+            elif self.is_linear:
+                deviations = way.deviate(part, times)
+            else:
+                deviations = way.deviate(way.task_map.values(part), times)
+            place = max(place, deviations[0])
+            time = max(time, deviations[1])
+        return place, time
 
     def check_arm(self, axes: ControllerAxes) -> None:
         """Refuse lines of the tool where the controller's inverse kinematics would not be that of six joints."""
@@ -302,7 +322,9 @@ class _Follower:
             raise InputError(
                 "linear moves need a path of poses, and an arm of six joints",
                 where="moves",
-                found=f"task_space: {self.motion.task.task_space}, {count} joints",
+                found=f"task_space: {self.motion.task.task_space}, {count} joints"
+                if not self.motion.parts
+                else "a program of several parts",
                 allowed="joint",
             )
 
@@ -405,7 +427,42 @@ def nominal(
     return np.asarray(values + bow @ turn[near])
 
 
-def _events(motion: Trajectory, profile: Profile) -> Iterator[tuple[float, str]]:
+def _events(motion: Trajectory, profile: Profile) -> dict[float, str]:
+    """Return the instructions at which a process begins or ends, and those of a program's events, by their time, s.
+
+    Raises
+    ------
+    InputError
+        The profile has no instruction for an event, or two events occur at the same time.
+    """
+    events = dict(_process_events(motion, profile))
+    ends = np.append(0.0, motion.phase_ends)
+    for event in motion.events:
+        if event.name not in profile.events:
+            raise InputError(
+                "the controller has no instruction for an event of the program",
+                where="profile.events",
+                found=event.name,
+                allowed=", ".join(profile.events) or "none in this profile",
+                hint=f"Write a profile with extends: and events: {{{event.name}: ...}}",
+            )
+        nearest = float(ends[np.argmin(np.abs(ends - event.time))])
+        is_same = abs(nearest - event.time) < _SAME_TIME
+        time = nearest if is_same else event.time
+        if time in events:
+            raise InputError(
+                "a program of positions has one instruction at a time",
+                where="program.events",
+                found=f"{event.name} and another at {time:.4f} s",
+                hint="Give one of them a lead",
+            )
+        events[time] = profile.events[event.name]
+    return events
+
+
+def _process_events(
+    motion: Trajectory, profile: Profile
+) -> Iterator[tuple[float, str]]:
     """Yield the times, s, and instructions at which a process begins or ends."""
     is_process = [phase.kind == "given speed" for phase in motion.phases]
     ends = [0.0, *motion.phase_ends.tolist()]

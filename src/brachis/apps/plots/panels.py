@@ -15,7 +15,7 @@ from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, split_times
 
 MOST_CURVES = 10
 """Maximum number of curves in a panel of ratios."""
@@ -195,8 +195,12 @@ def _bound_tool_speed(
     trajectory: Trajectory, samples: Samples
 ) -> tuple[CurveBound, CurveBound]:
     """Return minus infinity, and the maximum tool speed that the task allows, (K,), m/s."""
-    limit = build_tool_speed(trajectory.robot, trajectory.task)
-    largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    largest = np.full(len(samples.t), np.inf)
+    for component, rows, t in split_times(trajectory, samples.t):
+        limit = build_tool_speed(component.robot, component.task)
+        if limit is not None:
+            s = component.path_coordinate(t)
+            largest[rows] = limit.largest_at(s)[0].min(axis=1)
     return -np.inf, largest
 
 
@@ -308,7 +312,7 @@ def _joint_panels(
     """Make the panels of a joint row, one for each unit."""
     row = PANELS[name]
     robot = trajectory.robot
-    lower, upper = robot.limits.both_ways(name)
+    lower, upper = _joint_bounds(trajectory, samples.t, name)
     columns = row.values(trajectory, samples).T
     names = trajectory.joint_names
     panels = []
@@ -328,6 +332,19 @@ def _joint_panels(
             ratio = f"{title} in its range" if row.is_range else f"{title} / limit"
             panels.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return panels
+
+
+def _joint_bounds(trajectory: Trajectory, t: np.ndarray, name: str) -> np.ndarray:
+    """Return the limits of the joints, (2, n), or (2, n, K) at times t, (K,), if parts of a program have others."""
+    pieces = list(split_times(trajectory, t))
+    n = trajectory.robot.n
+    limits = [piece[0].robot.limits.both_ways(name)[:, :n] for piece in pieces]
+    if all(np.array_equal(limits[0], other) for other in limits):
+        return limits[0]
+    bounds = np.empty((2, n, len(t)))
+    for ends, (_, rows, _) in zip(limits, pieces, strict=True):
+        bounds[:, :, rows] = ends[:, :, None]
+    return bounds
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, PanelCurve]]:

@@ -19,7 +19,7 @@ from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
 from brachis.robot.from_task import in_use
 from brachis.task import Task
-from brachis.trajectory import phase_rows
+from brachis.trajectory import phase_table
 
 NEAR = 0.9
 """Ratio to a limit above which a value is marked as close to this limit; 1 is the limit itself."""
@@ -146,9 +146,9 @@ def what_limits(motion: ReportedMotion) -> str:
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
-    """List the phases, each with its active limits. For a motion with only one phase, the list is empty."""
+    """List the phases or parts, each with its active limits. For a motion with only one phase, the list is empty."""
     phases = limits_by_phase(motion.trajectory, motion.saturations)
-    rows = phase_rows(motion.trajectory.phases)
+    _, _, rows = phase_table(motion.trajectory)
     if len(rows) == 1:
         return []
     return [(*row, str(limits)) for row, limits in zip(rows, phases, strict=True)]
@@ -193,9 +193,12 @@ def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, s
     if not curve.is_limited:
         return {"value": value, "limit": "", "share": "", "level": ""}
     share = ratios[worst]
-    limit = f"{_write_number(float(curve.upper))} {panel.unit}"
-    if curve.upper != -curve.lower:
-        limit = f"{_write_number(float(curve.lower))} to {limit}"
+    # Parts of a program may have limits of their own.
+    pair = (np.broadcast_to(end, ratios.shape) for end in (curve.lower, curve.upper))
+    lower, upper = (float(end[worst]) for end in pair)
+    limit = f"{_write_number(upper)} {panel.unit}"
+    if upper != -lower:
+        limit = f"{_write_number(lower)} to {limit}"
     edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
     return {
         "value": value,
