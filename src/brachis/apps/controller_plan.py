@@ -106,7 +106,7 @@ def plan_for_controller(
             result = plan(
                 robot,
                 scaled_task,
-                start_from=last_result,
+                start_from=None if loaded.program else last_result,
                 own_limits=own_limits,
                 listener=listener,
             )

@@ -104,8 +104,7 @@ def inspect(
         set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
         refuse_options(options, "a task file", f"a URDF; in a task file, set {set_it}")
         task = load_changed_task(source, keys)
-        paths = (part for part in task.program if isinstance(part, PathPart))
-        first = next(paths, task)
+        first = next((p for p in task.program if isinstance(p, PathPart)), task)
         space = space or first.task_space
         tolerances = first.tolerances
         with name_task_file(source, keys):
@@ -213,10 +212,7 @@ def _describe(
             "segments": [segment.kind for segment in problem.task.path],
             "length": problem.path.length if problem.task_map.axes else None,
         },
-        "parts": [
-            {"name": name_of(part, number), "kind": part.kind}
-            for number, part in enumerate(problem.task.program, start=1)
-        ],
+        "parts": [name_of(part, i + 1) for i, part in enumerate(problem.task.program)],
     }
 
 
@@ -307,8 +303,7 @@ def _print_robot(
             posture = write_posture(data, f"{end}_posture", degrees=degrees)
             print_lines(f"{end} posture: {posture}")
         if task.program:
-            parts = (f"{part['name']} ({part['kind']})" for part in data["parts"])
-            print_lines(f"program: {', '.join(parts)}")
+            print_lines(f"program: {', '.join(data['parts'])}")
         kinds = [segment.kind for segment in task.path]
         length = data["path"]["length"]
         long = "" if length is None else f", {length:.4g} m long"
