@@ -62,6 +62,7 @@ class TaskKeywords(RobotKeywords, total=False):
         | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]]
         | Array
     )
+    program: Sequence[Settings]
     start: Posture
     end: Posture
     frames: Mapping[str, Placement | Settings | Transform]

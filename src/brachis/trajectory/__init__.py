@@ -12,21 +12,19 @@ from brachis.trajectory.program import (
     PART_COLUMNS,
     Event,
     MotionPart,
-    change_robots,
     part_rows,
-    phase_table,
-    split_times,
     torques_of,
 )
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
-from brachis.trajectory.trajectory import (
-    CONTINUOUS_TORQUE,
+from brachis.trajectory.source import (
     MotionSource,
-    Trajectory,
+    change_robots,
     motion_of,
     of_motion,
+    phase_table,
 )
+from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 
 __all__ = [
     "CONTINUOUS_TORQUE",
@@ -48,6 +46,5 @@ __all__ = [
     "part_rows",
     "phase_rows",
     "phase_table",
-    "split_times",
     "torques_of",
 ]

@@ -17,7 +17,7 @@ from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.program import Program, is_safeguard
 from brachis.robot.custom_limits import LimitModel
-from brachis.trajectory import MotionPart, MotionPhase, Samples, Trajectory, split_times
+from brachis.trajectory import MotionPart, MotionPhase, Samples, Trajectory
 
 if TYPE_CHECKING:
     from brachis.search.planned import PlannedMotion
@@ -132,7 +132,7 @@ def limit_ratios(
     states = (trajectory.position(t), trajectory.velocity(t), qddot, jerk)
     # A time just before a jump belongs to the motion before it.
     just_before = np.nextafter(t, np.where(is_before_jump, -np.inf, t))
-    pieces = split_times(trajectory, just_before)
+    pieces = trajectory.split_times(just_before)
     columns: dict[Label, np.ndarray] = {}
     for same, (component, rows, times) in zip(by_component, pieces, strict=True):
         moments = _moments_of(component, times, [state[rows] for state in states])

@@ -23,7 +23,7 @@ from brachis.apps.export.rows import require_library
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.robot import Robot
-from brachis.trajectory import Trajectory, split_times
+from brachis.trajectory import Trajectory
 
 BLEND = 0.25
 """Half of the duration of the parabola at a corner, as a fraction of the shorter neighbouring time."""
@@ -230,7 +230,7 @@ class _Follower:
         self.stations = np.union1d(motion.phase_ends, stations)
         self.t = np.union1d(even, self.stations)
         self.ways = [
-            Way.of(component, t) for component, _, t in split_times(motion, self.t)
+            Way.of(component, t) for component, _, t in motion.split_times(self.t)
         ]
         self.task_map = self.ways[0].task_map
         self.motion = motion
@@ -297,7 +297,7 @@ class _Follower:
         values = nominal(self.t[nodes], self.followed[nodes], rests, t)
         place = 0.0
         time = 0.0
-        pieces = split_times(self.motion, t)
+        pieces = self.motion.split_times(t)
         for way, (component, rows, times) in zip(self.ways, pieces, strict=True):
             if not len(rows):
                 continue

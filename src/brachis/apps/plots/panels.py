@@ -15,7 +15,7 @@ from brachis.limits.tool import build_tool_speed
 from brachis.robot.joints import UNITS, shown_unit
 from brachis.scene import scene_of
 from brachis.scene.chain import Chain
-from brachis.trajectory import Samples, Trajectory, split_times
+from brachis.trajectory import Samples, Trajectory
 
 MOST_CURVES = 10
 """Maximum number of curves in a panel of ratios."""
@@ -196,7 +196,7 @@ def _bound_tool_speed(
 ) -> tuple[CurveBound, CurveBound]:
     """Return minus infinity, and the maximum tool speed that the task allows, (K,), m/s."""
     largest = np.full(len(samples.t), np.inf)
-    for component, rows, t in split_times(trajectory, samples.t):
+    for component, rows, t in trajectory.split_times(samples.t):
         limit = build_tool_speed(component.robot, component.task)
         if limit is not None:
             s = component.path_coordinate(t)
@@ -336,7 +336,7 @@ def _joint_panels(
 
 def _joint_bounds(trajectory: Trajectory, t: np.ndarray, name: str) -> np.ndarray:
     """Return the limits of the joints, (2, n), or (2, n, K) at times t, (K,), if parts of a program have others."""
-    pieces = list(split_times(trajectory, t))
+    pieces = list(trajectory.split_times(t))
     n = trajectory.robot.n
     limits = [piece[0].robot.limits.both_ways(name)[:, :n] for piece in pieces]
     if all(np.array_equal(limits[0], other) for other in limits):

@@ -26,7 +26,7 @@ from brachis.robot import Robot, task_map_of
 from brachis.robot.urdf_elements import Element, read_tree
 from brachis.scene import Solid, scene_of
 from brachis.scene.chain import Chain
-from brachis.trajectory import Samples, Trajectory, split_times
+from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
     import trimesh
@@ -311,7 +311,7 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are those of the tool."""
     points = samples.tool_position.copy()
-    for component, rows, t in split_times(trajectory, samples.t):
+    for component, rows, t in trajectory.split_times(samples.t):
         task_map = task_map_of(component.robot, component.task.task_space)
         axes = list(task_map.axes)
         if axes:
