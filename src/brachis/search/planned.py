@@ -13,13 +13,12 @@ from brachis.common.summary import Summary
 from brachis.common.threads import use_one_thread
 from brachis.explain import Sensitivities, explain_motion
 from brachis.optimise.backends import SolverReport
-from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Issue
 from brachis.search.least_motion import LeastMotion
 from brachis.search.stages import Candidate, FinishedCandidate
 from brachis.task import FitReport, Task
 from brachis.timing import TimingGap
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, settings_in_use
 from brachis.verify import Verification
 
 if TYPE_CHECKING:
@@ -149,7 +148,7 @@ class PlannedMotion(Summary):
             "end_posture": end,
             "position_units": list(trajectory.robot.position_units),
             "family": self.family,
-            "in_use": in_use(trajectory.robot, trajectory.node_accelerations),
+            "in_use": settings_in_use(trajectory),
             "status": report.status.name.lower(),
             "advice": report.status.value,
             "solver": report.solver,

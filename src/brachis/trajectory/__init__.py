@@ -23,6 +23,7 @@ from brachis.trajectory.source import (
     motion_of,
     of_motion,
     phase_table,
+    settings_in_use,
 )
 from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 
@@ -46,5 +47,6 @@ __all__ = [
     "part_rows",
     "phase_rows",
     "phase_table",
+    "settings_in_use",
     "torques_of",
 ]

@@ -10,6 +10,7 @@ from typing import Concatenate, ParamSpec, Protocol, TypeVar
 
 from brachis.errors import InputError
 from brachis.robot import Robot
+from brachis.robot.from_task import in_use
 from brachis.trajectory.phases import PHASE_COLUMNS, phase_rows
 from brachis.trajectory.program import PART_COLUMNS, part_rows
 from brachis.trajectory.trajectory import Trajectory
@@ -83,3 +84,13 @@ def change_robots(motion: Trajectory, change: Callable[[Robot], Robot]) -> Traje
         for begin, component in motion.components
     )
     return replace(motion, robot=change(motion.robot), components=components)
+
+
+def settings_in_use(motion: Trajectory) -> dict[str, str]:
+    """Return the settings of the robot in use, with the payloads of all parts of a program."""
+    shown = in_use(motion.robot, motion.node_accelerations)
+    robots = [part.robot for _, part in motion.components]
+    payloads = dict.fromkeys(in_use(robot).get("payload", "none") for robot in robots)
+    if len(payloads) > 1:
+        shown["payload"] = ", then ".join(payloads)
+    return shown

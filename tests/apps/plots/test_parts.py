@@ -70,6 +70,10 @@ def test_a_report_has_a_table_of_parts_with_their_limits(motion):
         assert f"<td>{name}</td>" in rows
     assert "x_axis velocity (" in rows
     assert "tool speed (" in rows
+    assert "<td>line (by [0.1, 0.2]); the tool moves 0." in page.html
+    assert f"<td>process_on at {motion.events[0].time:.4f} s, process_off" in page.html
+    assert "prescribed: x, y<" in page.html
+    assert "none, then 3 kg at " in page.html
     assert "more speed at tool" in page.html
 
 
