@@ -7,20 +7,17 @@ do. The tool is also checked on the straight joint lines between samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from brachis.apps.controller.axes import ControllerAxes, bind_axes
-from brachis.apps.controller.differences import check_differences, check_tool_speed
 from brachis.apps.controller.limits import robot_with_profile, without_scale
 from brachis.apps.controller.profile import Profile, load_profile
-from brachis.common.arrays import spread
-from brachis.common.summary import Summary
+from brachis.common.arrays import interpolate_columns, spread
 from brachis.errors import InputError
 from brachis.path import Path, path_of
 from brachis.robot import TaskMap, bind
@@ -30,13 +27,14 @@ from brachis.trajectory import (
     Samples,
     Trajectory,
     change_robots,
-    join_splines,
     motion_of,
 )
 from brachis.verify import Check, Verification, VerifyOptions
+from brachis.verify.checks import check_joints
 from brachis.verify.limits import check_limits
-from brachis.verify.mechanics import joint_placements
-from brachis.verify.motion import CheckedMotion, MotionStates
+from brachis.verify.limits.tool import largest_speeds
+from brachis.verify.mechanics import joint_placements, real_tool_placements
+from brachis.verify.motion import CheckedMotion
 from brachis.verify.verify import path_errors, place_in_program
 
 _MOVING = 1e-6
@@ -45,17 +43,15 @@ _STILL = 1e-9
 """A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
-_CHORD_STEPS = 4
-"""Number of steps in which the straight joint line between two samples is checked."""
-_SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2)
-"""Factors on the duration to try when a run fails."""
-_SHORTER = (2, 4, 8)
-"""Divisors of the period to try when a run fails."""
+_FEWEST_NODES = 2
+"""Number of samples in a part of a program from which on there is a motion to check."""
+_DIVISORS = (2, 4, 8)
+"""Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
 
-@dataclass(frozen=True, repr=False)
-class RunReport(Summary):
-    """Verification of a motion as a controller will run it.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class RunReport(Verification):
+    """Verification of a motion as a controller will run it: limits of the task and of the profile, path, and both ends.
 
     Attributes
     ----------
@@ -63,8 +59,6 @@ class RunReport(Summary):
         Name of the controller and its interface.
     period : float
         Time between samples, s.
-    verification : Verification
-        Checks of the limits of the task and of the profile, of the path, and of both ends.
     remedies : tuple of str
         Changes, each of which is verified to make the run pass; empty if it passes anyway.
 
@@ -78,29 +72,13 @@ class RunReport(Summary):
 
     controller: str
     period: float
-    verification: Verification
     remedies: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return self.verification.passed
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """Failed checks, in words."""
-        return self.verification.failures
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        data = {**vars(self), "verification": self.verification.to_dict()}
-        return {"passed": self.passed, **data}
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user: every check with its worst value."""
         return {
             "controller": f"{self.controller}, every {1e3 * self.period:g} ms",
-            **self.verification.summary(),
+            **super().summary(),
             "remedies": "; ".join(self.remedies) or "none needed",
         }
 
@@ -148,12 +126,20 @@ def verify_run(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    period = check_period(profile, period)
+    period = profile.period if period is None else period
+    if profile.fixed_period and period != profile.period:
+        raise InputError(
+            "the controller does not accept this period",
+            where="dt",
+            found=f"{period:g} s",
+            allowed=f"{profile.period:g} s ({profile.title})",
+        )
     motion = with_profile(motion, profile, axes)
     run = _Run(motion, profile, axes, tuple(own_limits))
-    verification = run.verify(period)
-    remedies = () if verification.passed else tuple(_find_remedies(run, period))
-    return RunReport(profile.title, period, verification, remedies)
+    report = run.verify(period)
+    if report.passed:
+        return report
+    return replace(report, remedies=tuple(_find_remedies(run, period)))
 
 
 def with_profile(
@@ -164,26 +150,6 @@ def with_profile(
         motion,
         lambda robot: robot_with_profile(without_scale(robot), profile, axes),
     )
-
-
-def check_period(profile: Profile, period: float | None) -> float:
-    """Return the period of the samples for a controller, s; by default the period of the profile.
-
-    Raises
-    ------
-    InputError
-        The controller accepts only its own period.
-    """
-    if period is None or period == profile.period:
-        return profile.period
-    if profile.fixed_period:
-        raise InputError(
-            "the controller does not accept this period",
-            where="dt",
-            found=f"{period:g} s",
-            allowed=f"{profile.period:g} s ({profile.title})",
-        )
-    return period
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
@@ -229,92 +195,107 @@ class _Run:
     axes: ControllerAxes
     own_limits: tuple[LimitModel, ...]
 
-    def verify(self, period: float) -> Verification:
+    def verify(self, period: float) -> RunReport:
         """Verify the run with a given period, s."""
-        samples = self.motion.sample(period, last=self.profile.last)
+        profile = self.profile
+        samples = self.motion.sample(period, last=profile.last)
         q = samples.q.copy()
-        if self.profile.decimals is not None:
-            values = np.round(self.axes.encode(q), self.profile.decimals)
+        if profile.decimals is not None:
+            values = np.round(self.axes.encode(q), profile.decimals)
             q[:, self.axes.index] = self.axes.decode(values)
-        run = interpolate(self.motion, samples, q, self.profile.interpolation)
-        worst: dict[str, Check] = {}
+        worst_checks: dict[str, Check] = {}
         points = 0
-        for begin, part, sampled in self._split(run):
-            checks, count = self._check(part, sampled)
-            points += count
-            for check in checks:
-                before = worst.get(check.name)
+        run = interpolate(self.motion, samples, q, profile.interpolation)
+        for begin, part in self._split(run):
+            motion = self._with_path(part)
+            points += len(motion.states.t)
+            for check in self._check(motion):
+                before = worst_checks.get(check.name)
                 if before is None or check.share > before.share:
-                    worst[check.name] = place_in_program(run, begin, check)
-        worst |= {check.name: check for check in _check_rest(self.motion, self.profile)}
-        ratios = (check.value for check in worst.values() if check.of_limit)
-        error = worst["path error"].value
-        return Verification(
-            tuple(worst.values()), points, max(ratios, default=0.0), error
+                    placed = place_in_program(self.motion, begin, check)
+                    worst_checks[check.name] = placed
+        checks = list(worst_checks.values())
+        ratios = [check for check in checks if check.limit]
+        errors = [check.value for check in checks if check.name == "path error"]
+        if profile.rest == "full":
+            plan = self.motion
+            ends = [0, -1]
+            allowed = _REST * max(np.abs(plan.qddot).max(), 1.0)
+            name = "acceleration at the ends"
+            instants = (plan.qddot[ends], plan.times[ends])
+            kind = "acceleration"
+            whole = self._with_path(plan)
+            checks.append(check_joints(whole, name, *instants, kind, allowed))
+        worst = max((check.value for check in ratios), default=0.0)
+        return RunReport(
+            checks=tuple(checks),
+            points=points,
+            worst_ratio=worst,
+            path_error=max(errors, default=0.0),
+            controller=profile.title,
+            period=period,
         )
 
-    def _split(self, run: Trajectory) -> Iterator[tuple[float, Trajectory, Trajectory]]:
-        """Yield the run, or that of each component, with the time at which it begins, s, and the samples around it.
-
-        The run of a component begins and ends where the plan rests. Samples closer than half a period are left out.
-        """
+    def _split(self, run: Trajectory) -> Iterator[tuple[float, Trajectory]]:
+        """Yield the run of every component, with the time at which it begins, s; it consists of the nodes within."""
         if not run.components:
-            yield 0.0, run, run
+            yield 0.0, run
         for begin, component in run.components:
-            t = run.times - begin
-            half = 0.5 * run.times[1]
-            inside = (t > half) & (t < component.t_end - half)
-            times = np.concatenate([[0.0], t[inside], [component.t_end]])
-            samples = component.at(times)
-            q = samples.q.copy()
-            q[1:-1, : run.q.shape[1]] = run.q[inside]
-            part = interpolate(component, samples, q, self.profile.interpolation)
-            ends = (-2.0 * half, component.t_end + 2.0 * half)
-            around = slice(*np.searchsorted(t, ends))
-            rows = {name: getattr(run, name)[around] for name in ("q", "qdot", "qddot")}
-            yield begin, part, replace(run, times=t[around], **rows)
+            local = run.times - begin
+            (rows,) = np.nonzero((local >= 0.0) & (local <= component.t_end))
+            if len(rows) < _FEWEST_NODES:
+                continue
+            first = local[rows[0]]
+            t = local[rows]
+            plan = component.at(t)
+            times = t - first
+            nodes: dict[str, Any] = {}
+            for name in ("q", "qdot", "qddot", "qddot_before"):
+                virtual = getattr(plan, name.removesuffix("_before"))
+                joints = getattr(run, name)[rows]
+                nodes[name] = np.hstack([joints, virtual[:, joints.shape[1] :]])
+            inner = replace(
+                component,
+                times=times,
+                degree=1,
+                knots=np.pad(times / times[-1], 1, mode="edge"),
+                control_points=plan.s[None],
+                phase_ends=times[-1:],
+                **nodes,
+            )
+            yield begin + first, inner
 
-    def _check(self, run: Trajectory, sampled: Trajectory) -> tuple[list[Check], int]:
-        """Check a run, and its samples by differences; return the number of instants too."""
+    def _with_path(self, run: Trajectory) -> CheckedMotion:
+        """Return a run with its path, for the checks."""
         task = run.task
         robot, task_map = bind(run.robot, task.task_space, task.tolerances)
-        path = path_of(task_map, task)
-        options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
-        allowed = 1.0 + options.ratio_tolerance
-        differences: list[Check] = []
-        kind = CheckedMotion
+        return CheckedMotion(
+            run,
+            robot,
+            task_map,
+            path_of(task_map, task),
+            VerifyOptions(ratio_tolerance=task.refinement.tolerance),
+            is_sampled=self.profile.is_sampled,
+        )
+
+    def _check(self, motion: CheckedMotion) -> list[Check]:
+        """Check the path, and the limits."""
+        ratios = check_limits(motion, self.own_limits)
         if self.profile.is_sampled:
-            differences = [
-                *check_differences(robot, sampled, allowed),
-                *check_tool_speed(run, sampled, allowed),
-            ]
-            kind = _SampledMotion
-        checked = kind(run, robot, task_map, path, options)
-        replaced = {
-            check.name.replace("by differences", "ratio") for check in differences
-        }
-        limits = check_limits(checked, self.own_limits)
-        ratios = [check for check in limits if check.name not in replaced] + differences
-        return [_check_path(checked, self.profile), *ratios], len(checked.states.t)
-
-
-class _SampledMotion(CheckedMotion):
-    """A motion that is known only at its nodes."""
-
-    @cached_property
-    def states(self) -> MotionStates:
-        """States of the motion at its nodes."""
-        last = len(self.pieces.lengths) - 1
-        index = np.append(np.arange(last + 1), last)
-        u = np.zeros(last + 2)
-        u[-1] = 1.0
-        return MotionStates(self.pieces, index, u)
+            differences = list(_check_differences(motion))
+            replaced = {check.limit for check in differences}
+            ratios = [check for check in ratios if check.limit not in replaced]
+            ratios += differences
+        return [_check_path(motion, self.profile), *ratios]
 
 
 def interpolate(
     motion: Trajectory, samples: Samples, q: np.ndarray, interpolation: str
 ) -> Trajectory:
     """Return the motion between samples.
+
+    For ``hold`` and ``linear``, only the nodes, which are the samples, have a meaning. Their velocities and
+    accelerations are central differences, with rest before the first and after the last sample.
 
     Parameters
     ----------
@@ -329,68 +310,40 @@ def interpolate(
     Returns
     -------
     Trajectory
-        The interpolated motion, with the path coordinate of the plan. It waits at the end until the last sample.
+        The interpolated motion, with the path coordinate of the plan.
     """
     t = samples.t
-    h = np.diff(t)[:, None]
-    slopes = np.diff(q, axis=0) / h
-    qdot = samples.qdot
-    after = samples.qddot
-    before = samples.qddot
-    if interpolation == "cubic":
-        after = np.zeros_like(q)
-        before = np.zeros_like(q)
-        after[:-1] = (6.0 * slopes - 4.0 * qdot[:-1] - 2.0 * qdot[1:]) / h
-        before[1:] = (2.0 * qdot[:-1] + 4.0 * qdot[1:] - 6.0 * slopes) / h
-        after[-1] = before[-1]
-        before[0] = after[0]
-    elif interpolation != "quintic":
-        qdot, after = _central_differences(t, q, samples.qdot[[0, -1]])
-        before = after
-    splines = motion.phase_splines
-    wait = t[-1] - motion.t_end
-    if wait > _STILL:
-        splines = (*splines, splines[-1].wait(wait))
-    knots, control_points = join_splines(splines)
-    ends = np.cumsum([spline.t_end for spline in splines])
-    ends[-1] = t[-1]
-    return replace(
-        motion,
-        times=t,
-        q=q,
-        qdot=qdot,
-        qddot=after,
-        qddot_before=before,
-        knots=knots,
-        control_points=control_points,
-        phase_ends=ends,
-    )
+    nodes: dict[str, Any] = {"times": t, "q": q, "qdot": samples.qdot}
+    if interpolation == "quintic":
+        nodes |= {"qddot": samples.qddot, "qddot_before": samples.qddot}
+    elif interpolation == "cubic":
+        from scipy.interpolate import CubicHermiteSpline
 
-
-def _central_differences(
-    t: np.ndarray, q: np.ndarray, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocities and accelerations, (K, n), at the samples; `ends`, (2, n), are the velocities at both ends."""
-    h = np.diff(t)[:, None]
-    slopes = np.diff(q, axis=0) / h
-    qdot = np.empty_like(q)
-    qdot[1:-1] = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[1:] + h[:-1])
-    qdot[[0, -1]] = ends
-    qddot = np.empty_like(q)
-    qddot[1:-1] = 2.0 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
-    qddot[0] = 2.0 * (slopes[0] - qdot[0]) / h[0]
-    qddot[-1] = 2.0 * (qdot[-1] - slopes[-1]) / h[-1]
-    return qdot, qddot
+        rates, begins = CubicHermiteSpline(t, q, samples.qdot).derivative(2).c
+        ends = begins + rates * np.diff(t)[:, None]
+        nodes["qddot"] = np.concatenate([begins, ends[-1:]])
+        nodes["qddot_before"] = np.concatenate([begins[:1], ends])
+    else:
+        mirrored = np.pad(q, ((1, 1), (0, 0)), mode="reflect")
+        nodes["qdot"] = (mirrored[2:] - mirrored[:-2]) / (2.0 * t[1])
+        qddot = np.diff(mirrored, 2, axis=0) / t[1] ** 2
+        nodes |= {"qddot": qddot, "qddot_before": qddot}
+        # The plan may end before the last sample; its path coordinate is that of the samples, too.
+        knots = np.pad(t / t[-1], 1, mode="edge")
+        nodes |= {"knots": knots, "control_points": samples.s[None]}
+        motion = replace(motion, degree=1, phase_ends=t[-1:])
+    return replace(motion, **nodes)
 
 
 def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
     """Check the distance of the tool from the path, between bare samples along straight joint lines."""
     t = motion.states.t
     q = motion.states.q
-    if isinstance(motion, _SampledMotion):
-        t = spread(motion.trajectory.times, _CHORD_STEPS)
-        nodes = motion.trajectory.times
-        q = np.column_stack([np.interp(t, nodes, joint) for joint in q.T])
+    if motion.is_sampled:
+        # A short line is farthest from the path in its middle.
+        middles = spread(t, 2)
+        q = interpolate_columns(middles, t, q)
+        t = middles
     s = motion.trajectory.path_spline(t).clip(0.0, 1.0)
     # A tool that is early or late on the path has not left the path.
     s = nearest_on_path(motion.path, motion.task_map, motion.task_map.values(q), s)
@@ -417,41 +370,87 @@ def nearest_on_path(
     return s
 
 
-def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
-    """Check that the plan begins and ends as the controller requires."""
-    if profile.rest != "full":
-        return
-    ends = np.abs(motion.qddot[[0, -1]])
-    joint = int(np.argmax(ends.max(axis=0)))
-    allowed = _REST * max(np.abs(motion.qddot).max(), 1.0)
-    yield Check(
-        "acceleration at the ends",
-        ends[:, joint].max(),
-        allowed,
-        "rad/s^2, m/s^2",
-        motion.joint_names[joint],
-    )
+def _check_differences(motion: CheckedMotion) -> Iterator[Check]:
+    """Check the differences of successive samples, divided by the period, as controllers do."""
+    t = motion.states.t
+    for limit, order, ratios, subjects in _list_ratios(motion):
+        if not ratios.any():
+            continue
+        row, column = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
+        yield Check(
+            f"{limit} by differences",
+            ratios[row, column],
+            1.0 + motion.options.ratio_tolerance,
+            "-",
+            subjects[column],
+            t[np.clip(row - order + 2, 0, len(t) - 1)],
+            limit=limit,
+        )
+
+
+def _list_ratios(
+    motion: CheckedMotion,
+) -> Iterator[tuple[str, int, np.ndarray, Sequence[str]]]:
+    """Yield limits, orders of differences, their ratios, (K', c), and their c subjects; 0 without a limit."""
+    robot = motion.robot
+    states = motion.states
+    names = robot.joint_names
+    period = states.t[1]
+    derivatives = [("velocity", 1, states.q)]
+    derivatives += [("acceleration", 2, states.q), ("jerk", 3, states.q)]
+    if robot.has_masses:
+        derivatives.append(("torque_rate", 1, states.tau))
+        heat = np.cumsum(states.tau**2, axis=0) / len(states.t)
+        yield "rms torque", 1, np.sqrt(heat) / robot.limits.rms_torque, names
+    for kind, order, values in derivatives:
+        lower, upper = robot.limits.both_ways(kind)
+        # The controller holds the first position before the motion, and the last one after it.
+        held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
+        rates = np.diff(held, order, axis=0) / period**order
+        ratios = np.maximum(rates / upper, rates / lower)
+        yield kind.replace("_", " "), order, ratios, names
+    tool, _ = real_tool_placements(robot, *states.joints)
+    steps = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    largest = largest_speeds(motion.task, states.s, np.maximum)
+    allowed = period * np.maximum(largest[1:], largest[:-1])
+    yield "tool speed", 1, (steps / allowed)[:, None], ("tool",)
 
 
 def _find_remedies(run: _Run, period: float) -> Iterator[str]:
-    """Yield changes that let a run pass, each of them verified."""
+    """Yield the smallest changes that let a run pass, each of them verified."""
     profile = run.profile
-    trials: list[list[tuple[str, _Run, float]]] = [[], [], []]
-    for decimals in range(10 if profile.decimals is None else profile.decimals + 1, 10):
-        finer = profile.model_copy(update={"decimals": decimals})
-        text = f"{decimals} decimals"
-        trials[0].append((text, replace(run, profile=finer), period))
-    for divisor in () if profile.fixed_period else _SHORTER:
-        text = f"a period of {1e3 * period / divisor:g} ms"
-        trials[1].append((text, run, period / divisor))
+    decimals = range(10 if profile.decimals is None else profile.decimals + 1, 10)
+    divisors = () if profile.fixed_period else _DIVISORS
+    periods = [1e3 * period / divisor for divisor in divisors]
     has_speeds = run.motion.task.tool_limits.process_speed
-    for factor in () if has_speeds else _SLOWER:
-        slower = replace(run, motion=slow_down(run.motion, factor))
-        trials[2].append((f"{100.0 / factor:.4g} % of the speed", slower, period))
-    for group in trials:
-        passing = (text for text, trial, dt in group if trial.verify(dt).passed)
-        for text in islice(passing, 1):
-            yield f"the motion passes with {text}"
+    speeds = () if has_speeds else [0.1 * number for number in range(999, 499, -1)]
+
+    def passes(changed: _Run, period: float) -> bool:
+        """Return whether a changed run passes."""
+        return changed.verify(period).passed
+
+    changes: tuple[tuple[str, Sequence[float], Callable[[Any], bool]], ...] = (
+        (
+            "{} decimals",
+            decimals,
+            lambda value: passes(
+                replace(run, profile=profile.model_copy(update={"decimals": value})),
+                period,
+            ),
+        ),
+        ("a period of {:g} ms", periods, lambda value: passes(run, 1e-3 * value)),
+        (
+            "{:g} % of the speed",
+            speeds,
+            lambda value: passes(
+                replace(run, motion=slow_down(run.motion, 100.0 / value)), period
+            ),
+        ),
+    )
+    for text, values, has_passed in changes:
+        index = bisect_left(values, 1, key=has_passed)
+        if index < len(values):
+            yield f"the motion passes with {text.format(values[index])}"
     yield "to plan a motion that passes, plan with the profile (--profile)"
 
 
