@@ -81,3 +81,16 @@ def test_speeds_that_are_given_in_a_part_are_those_of_its_phases():
     middle = 0.5 * (phases[2].begin + phases[2].end)
     (speed,) = result.trajectory.at(middle).tool_speed
     assert speed == phases[2].speed == pytest.approx(0.2)
+
+
+def test_programs_with_a_free_order_are_saved_with_the_order_that_was_chosen(tmp_path):
+    paths = [
+        {"path": [{"line": {"by": [0.05, 0.0]}}], "path_start": [x, 0.0], "name": name}
+        for x, name in ((0.3, "far"), (0.15, "near"))
+    ]
+    result = brachis.plan({**CYCLE, "program": paths, "order": "free"})
+    result.save(tmp_path / "cycle.npz")
+    loaded = brachis.Trajectory.load(tmp_path / "cycle.npz")
+    assert loaded.parts == result.trajectory.parts
+    assert {part.name for part in loaded.parts} == {"move", "near", "far"}
+    assert brachis.verify_trajectory(loaded).passed

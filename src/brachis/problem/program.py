@@ -167,6 +167,7 @@ def _task_of(way: _Way, robot: Robot, task: Task, before: Path | None) -> Task:
     limited = way.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
+        "order": "given",
         "robot": robot.settings,
         "start": "free",
         "end": "free",
