@@ -63,6 +63,7 @@ class TaskKeywords(RobotKeywords, total=False):
         | Array
     )
     program: Sequence[Settings]
+    order: Literal["given", "free"]
     start: Posture
     end: Posture
     frames: Mapping[str, Placement | Settings | Transform]
