@@ -53,7 +53,7 @@ from brachis.task import (
     Task,
     TaskKeywords,
     check_keywords,
-    name_of,
+    part_names,
     task_with,
 )
 from brachis.timing import SlowTimingWarning, find_timing_gap
@@ -281,9 +281,7 @@ def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
     """Report the robot, and the path and the task space of a plan or the parts of its program."""
     joints = write_count(robot.n, "joint")
     if task.program:
-        parts = ", ".join(
-            name_of(part, number) for number, part in enumerate(task.program, start=1)
-        )
+        parts = ", ".join(part_names(task.program))
         report(f"planning for {joints} a program of {len(task.program)} parts: {parts}")
         return
     rows = task.task_space

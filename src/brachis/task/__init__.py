@@ -38,7 +38,9 @@ from brachis.task.program import (
     PayloadPart,
     RetractPart,
     name_of,
+    part_names,
     path_keys,
+    scene_during,
 )
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
@@ -106,9 +108,11 @@ __all__ = [
     "load_task",
     "name_of",
     "name_task_file",
+    "part_names",
     "path_keys",
     "read_assignment",
     "read_limits",
+    "scene_during",
     "task_with",
     "with_keys",
 ]

@@ -13,6 +13,7 @@ from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.orientation import ToolPose, Transform
+from brachis.task.program import Part
 from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.segments import SegmentModel
 from brachis.task.settings import (
@@ -62,7 +63,7 @@ class TaskKeywords(RobotKeywords, total=False):
         | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]]
         | Array
     )
-    program: Sequence[Settings]
+    program: Sequence[Part | Mapping[str, Any]]
     order: Literal["given", "free"]
     start: Posture
     end: Posture
@@ -157,8 +158,6 @@ def task_with(
     content: dict[str, Any] = {"brachis": 1}
     if source is not None:
         content = load_task(source).model_dump(exclude_unset=True)
-        if not content.get("path", True):
-            del content["path"]  # of a move
     for key, value in keywords.items():
         change = {key: _in_full(key, value)}
         if key in _SECTION_OF:

@@ -188,7 +188,7 @@ def _describe(
     """Describe robot and task as plain data for JSON. Free ends, and the length of a joint path, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
-    from brachis.task import name_of
+    from brachis.task import part_names
     from brachis.task.fields import plain
 
     limits = joint_limits_of(robot) if problem is None else problem.limits
@@ -212,7 +212,7 @@ def _describe(
             "segments": [segment.kind for segment in problem.task.path],
             "length": problem.path.length if problem.task_map.axes else None,
         },
-        "parts": [name_of(part, i + 1) for i, part in enumerate(problem.task.program)],
+        "parts": part_names(problem.task.program),
     }
 
 

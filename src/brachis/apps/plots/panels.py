@@ -206,10 +206,15 @@ def _bound_tool_speed(
 
 def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Return the distances of the closest pairs of bodies, (K,), m."""
-    scene = scene_of(trajectory.robot, trajectory.task)
-    assert scene is not None
-    placed = Chain.of(trajectory.robot.model).place(samples.q)
-    return scene.find_closest(placed).distance
+    distances = np.full(len(samples.t), np.nan)
+    chain = Chain.of(trajectory.robot.model)
+    for component, rows, _ in trajectory.split_times(samples.t):
+        scene = scene_of(component.robot, component.task)
+        if scene is not None and len(scene.pairs) and len(rows):
+            placed = chain.place(samples.q[rows])
+            distances[rows] = scene.find_closest(placed).distance
+    # Without pairs, nothing is close.
+    return np.where(np.isnan(distances), np.nanmax(distances), distances)
 
 
 PANELS = {
@@ -264,8 +269,11 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 
 def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the titles of the tool rows, including the clearance if the task checks collisions."""
-    scene = scene_of(trajectory.robot, trajectory.task)
-    has_pairs = scene is not None and len(scene.pairs) > 0
+    tasks = [
+        (part.robot, part.task) for part, _, _ in trajectory.split_times(np.zeros(1))
+    ]
+    scenes = [scene_of(*pair) for pair in tasks]
+    has_pairs = any(scene is not None and len(scene.pairs) for scene in scenes)
     return ("tool speed", "clearance") if has_pairs else ("tool speed",)
 
 

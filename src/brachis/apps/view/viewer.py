@@ -108,7 +108,7 @@ class Viewer(AbstractContextManager["Viewer"]):
     def show(self) -> None:
         """Show the motion at the current instant of the playback."""
         with self._lock, self._server.atomic():
-            self._scene.show(self._trajectory.position(self.playback.time))
+            self._scene.show(self.playback.time)
             self._update()
 
     def wait(self) -> None:
@@ -149,7 +149,7 @@ class Viewer(AbstractContextManager["Viewer"]):
                 continue
             with self._lock, self._server.atomic():
                 t = self.playback.advance(elapsed)
-                self._scene.show(self._trajectory.position(t))
+                self._scene.show(t)
                 picture += 1
                 if picture % 3 == 0:
                     self._update()
