@@ -21,6 +21,7 @@ from brachis.search.stages import (
     facts_of,
     name_coordinates,
 )
+from brachis.trajectory import Trajectory
 from brachis.verify import Verification, verify_trajectory
 
 _DENSER = 4
@@ -71,8 +72,9 @@ def verify(
     candidate: RankedCandidate | FinishedCandidate,
     before: tuple[SolverReport, ...],
     refined: SolvedProgram,
+    motion: Trajectory | None = None,
 ) -> Candidate:
-    """Extract the trajectory of a refined program and verify it.
+    """Extract the trajectory of a refined program, unless it is given, and verify it.
 
     Parameters
     ----------
@@ -80,6 +82,7 @@ def verify(
     before : tuple of SolverReport
         Reports of earlier solves.
     refined : SolvedProgram
+    motion : Trajectory, optional
 
     Returns
     -------
@@ -90,7 +93,7 @@ def verify(
     verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
-            trajectory = extract_motion(problem, refined.program, refined.x)
+            trajectory = motion or extract_motion(problem, refined.program, refined.x)
             verification = verify_trajectory(trajectory, own_limits=problem.own_limits)
     maps = [phase.joint_map for phase in refined.program.phases]
     tolerance = problem.task.refinement.tolerance
