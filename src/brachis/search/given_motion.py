@@ -71,6 +71,8 @@ def given_guess(
     UnreachableError
         The motion cannot be used; the text says why, in plain words.
     """
+    if problem.is_chain or motion.components:
+        raise UnreachableError("a program is not planned from a known motion")
     joints = problem.robot.urdf_joints
     motion_joints = motion.robot.urdf_joints
     if not set(joints) <= set(motion_joints):
@@ -193,8 +195,11 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
 def narrow_motion(motion: Trajectory) -> Trajectory:
     """Undo `widen_plan`: return the motion of the simpler task for which it is optimal.
 
-    A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged.
+    A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged. So is the
+    motion of a program.
     """
+    if motion.components:
+        return motion
     wider = motion.robot
     _, task_map = bind(wider, motion.task.task_space, motion.task.tolerances)
     spline = motion.phase_splines[0]

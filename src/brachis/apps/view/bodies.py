@@ -313,13 +313,14 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are those of the tool."""
-    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    axes = list(task_map.axes)
     points = samples.tool_position.copy()
-    if axes:
-        path = path_of(task_map, trajectory.task)
-        target = path.sample(np.clip(samples.s, 0.0, 1.0)).target
-        points[:, axes] = target[:, : len(axes)]
+    for component, rows, t in trajectory.split_times(samples.t):
+        task_map = task_map_of(component.robot, component.task.task_space)
+        axes = list(task_map.axes)
+        if axes:
+            path = path_of(task_map, component.task)
+            s = np.clip(component.path_coordinate(t), 0.0, 1.0)
+            points[rows[:, None], axes] = path.sample(s).target[:, : len(axes)]
     return points
 
 

@@ -69,8 +69,9 @@ class ViewerScene:
         self.layers["tool frame"].append(tool)
         self.layers["world frame"].append(self._frame("/world", 0.15))
         self._draw_ground()
-        self._cell = scene_of(self._robot, trajectory.task)
-        if self._cell is not None and len(self._cell.pairs):
+        parts = [part for part, _, _ in trajectory.split_times(np.zeros(1))]
+        self._cells = [scene_of(part.robot, part.task) for part in parts]
+        if any(cell is not None and len(cell.pairs) for cell in self._cells):
             line = (np.zeros((2, 3)), (200, 30, 30), 3.0)
             self._draw_line("closest pair", f"{_PATHS}/closest/line", *line)
             label = self._api.add_label(f"{_PATHS}/closest/label", "")
@@ -85,14 +86,17 @@ class ViewerScene:
         for handle in self.layers[name]:
             handle.visible = visible
 
-    def show(self, q: np.ndarray) -> None:
-        """Show the robot in the posture `q`, (n,)."""
+    def show(self, t: float) -> None:
+        """Show the robot at a time, s."""
+        q = self._trajectory.position(t)
         positions, quaternions = placements(self._robot, q[None])
         for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
-        if self._cell is not None and "closest pair" in self.layers:
-            self._show_closest(self._cell, q)
+        begins = [begin for begin, _ in self._trajectory.components[1:]]
+        cell = self._cells[int(np.searchsorted(begins, t, side="right"))]
+        if cell is not None and len(cell.pairs):
+            self._show_closest(cell, q)
 
     def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
         """Draw a line between the closest bodies in a posture, (n,), and write their distance."""
