@@ -201,6 +201,43 @@ def into_the_car_body() -> Planned:
     return {"through the window": result}
 
 
+def deburring_cycle() -> Planned:
+    """Animate a closed cycle over two edges."""
+    result = planned("17_deburring_cycle")
+    animate(result, "deburring_cycle", slower=3.0)
+    return {"cycle": result}
+
+
+def pick_and_place() -> Planned:
+    """Animate a box that is carried over a wall."""
+    result = planned("18_pick_and_place")
+    animate(result, "pick_and_place", slower=3.0)
+    return {"cycle": result}
+
+
+def order_of_welds() -> Planned:
+    """Animate welds in the best order."""
+    result = planned("19_order_of_welds")
+    animate(result, "order_of_welds", slower=3.0)
+    task = brachis.load_task(ROOT / "examples/19_order_of_welds.yaml")
+    return {"best order": result, "as listed": brachis.plan(_as_listed(task))}
+
+
+def _as_listed(task: brachis.Task) -> brachis.Task:
+    """Return the task with its paths in the order of the file."""
+    moves = [{"move": "next"} for _ in task.program]
+    parts = [each for pair in zip(moves, task.program, strict=True) for each in pair]
+    changed = {"order": "given", "program": [*parts, {"move": "home"}]}
+    return brachis.load_task({**task.to_dict(), **changed})
+
+
+def positioner() -> Planned:
+    """Animate a tube that turns under the torch."""
+    result = planned("20_positioner")
+    animate(result, "positioner", slower=5.0)
+    return {"tilt and turn": result}
+
+
 def crane() -> Planned:
     """Draw the motion with a plug-in's closed form."""
     family = load("examples/ik_plugin/src/brachis_polar/__init__.py").polar
@@ -237,6 +274,10 @@ EXAMPLES: dict[str, Callable[[], Planned]] = {
     "14": round_the_post,
     "15": tilted_torch,
     "16": into_the_car_body,
+    "17": deburring_cycle,
+    "18": pick_and_place,
+    "19": order_of_welds,
+    "20": positioner,
     "ik_plugin": crane,
     "limit_plugin": coupled,
 }

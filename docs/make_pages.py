@@ -31,6 +31,10 @@ PICTURES = {
     "14": ("round_the_post.gif", "Round a post"),
     "15": ("tilted_torch.gif", "A torch that may tilt"),
     "16": ("into_the_car_body.gif", "Into a car body"),
+    "17": ("deburring_cycle.gif", "A deburring cycle"),
+    "18": ("pick_and_place.gif", "Picked up and put down"),
+    "19": ("order_of_welds.gif", "Welds in any order"),
+    "20": ("positioner.gif", "A positioner turns the tube"),
     "ik_plugin": ("crane.png", "A closed form of your own: a crane"),
     "limit_plugin": ("coupled.png", "A limit of your own: two coupled joints"),
 }

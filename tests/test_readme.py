@@ -315,6 +315,27 @@ def test_examples_of_cells(name, changes):
     assert kinds >= ({"clearance ratio"} if task.scene else {"tool tilt ratio"})
 
 
+@pytest.mark.parametrize(
+    "name, kinds",
+    [
+        (
+            "17_deburring_cycle",
+            ["move", "approach", "path", "retract"] * 2 + ["move"],
+        ),
+        (
+            "18_pick_and_place",
+            ["move", "path", "dwell", "path"] * 2 + ["move"],
+        ),
+        ("19_order_of_welds", ["move", "path"] * 5 + ["move"]),
+    ],
+)
+def test_examples_of_programs(name, kinds):
+    task = brachis.load_task(ROOT / f"examples/{name}.yaml")
+    result = brachis.plan(task, effort="single", time_limit=600.0)
+    assert result.verified
+    assert [part.kind for part in result.trajectory.parts] == kinds
+
+
 def test_published_figure_lies_between_16_and_17_intervals():
     benchmark = load_script("studies/published_figure.py")
     assert benchmark.end_time(17) < benchmark.PUBLISHED_S < benchmark.end_time(16)
