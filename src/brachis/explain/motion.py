@@ -6,14 +6,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.explain.placement import placement_gradients
 from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
 from brachis.explain.task_figures import (
     STEP_OF_TIMING,
+    Lagrangian,
+    LeastTime,
     OptimalMotion,
     figure_sensitivities,
-    lagrangian_of,
-    least_time_of,
 )
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
@@ -56,19 +57,19 @@ def explain_motion(
     multipliers = _find_multipliers(motion, optimum)
     if multipliers is None:
         costs = sensitivities_of_timing(motion)
-        timed = (motion.program, motion.x, least_time_of)
+        value = LeastTime(motion.program)
+        timed = (motion.program, motion.x, value)
         answer = OptimalMotion(problem, *timed, step=STEP_OF_TIMING)
     else:
         costs = sensitivities_at(program, multipliers)
-        lagrangian = lagrangian_of(program, multipliers)
+        lagrangian = Lagrangian(program, multipliers)
         answer = OptimalMotion(problem, program, x, lagrangian)
-    if problem.is_chain:
-        return replace(costs, limits=_merge_figures(costs.limits, 1.0))
     time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
     figures = (*figure_sensitivities(answer), *costs.limits)
     limits = _merge_figures(figures, time_ratio)
-    savings = task_savings(problem, motion, answer)
-    return replace(costs, limits=limits, task=savings)
+    savings = () if problem.is_chain else task_savings(problem, motion, answer)
+    gradients = placement_gradients(answer, time_ratio)
+    return replace(costs, limits=limits, task=savings, gradients=gradients)
 
 
 def _find_multipliers(

@@ -91,6 +91,32 @@ class TaskSaving:
 
 
 @dataclass(frozen=True)
+class Gradient:
+    """Derivative of the end time with respect to a placement or a mass.
+
+    Attributes
+    ----------
+    subject : str
+        What is moved or made heavier: the name of a frame, ``path`` for paths in the world, ``base`` or ``payload``.
+    figure : str
+        ``x``, ``y`` and ``z`` along the axes of the world; ``roll``, ``pitch`` and ``yaw`` about them, through the
+        origin of the frame, of the base, or the beginning of the path; or ``mass``.
+    unit : str
+        ``m``, ``rad`` or ``kg``.
+    derivative : float or None
+        Derivative of the end time t_E, s per unit; None if there is none.
+    note : str
+        Why there is no derivative.
+    """
+
+    subject: str
+    figure: str
+    unit: str
+    derivative: float | None
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class BranchBoundary:
     """The time that the boundary of the branch costs; the boundary depends on the redundant joints, not on the robot.
 
@@ -137,6 +163,8 @@ class Sensitivities(Summary):
         tightened.
     task : tuple of TaskSaving
         Savings from changes of the task. The largest come first.
+    gradients : tuple of Gradient
+        Derivatives with respect to the placements of workpieces and base, and to the payload.
     """
 
     limits: tuple[Sensitivity, ...]
@@ -145,6 +173,7 @@ class Sensitivities(Summary):
     residual: float
     unique: bool
     task: tuple[TaskSaving, ...] = ()
+    gradients: tuple[Gradient, ...] = ()
 
     @property
     def reliable(self) -> bool:
@@ -165,6 +194,7 @@ class Sensitivities(Summary):
             "limits": [entry.to_dict() for entry in self.limits],
             "branch_boundaries": [entry.to_dict() for entry in self.boundaries],
             "task": [asdict(entry) for entry in self.task],
+            "gradients": [asdict(entry) for entry in self.gradients],
             "multipliers": self.source,
             "residual": self.residual,
             "reliable": self.reliable,
