@@ -44,6 +44,8 @@ def task_of(seed: int) -> dict[str, Any]:
         "start": "free",
         "task_space": ROBOTS[name],
         "search": {"least_motion": False, "time_limit": 600.0},
+        "refinement": {"tolerance": 1e-5},
+        "solver": {"tolerance": 1e-8},
     }
     if name == "scara3":
         direction = direction[:2]

@@ -9,6 +9,7 @@
 
 Planning           plan, plan_many, transcribe (the nonlinear program itself)
 Many plans         sweep, SweepResult: keys of a task varied over grids or at random, also on a cluster
+Where to put it    place: Placing (a workpiece or the base moved to a faster place)
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (the included ones)
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
     from brachis.apps.controller import profile_names as profile_names
     from brachis.apps.controller import verify_run as verify_run
     from brachis.apps.controller_plan import plan_for_controller as plan_for_controller
+    from brachis.apps.place import Placing as Placing
+    from brachis.apps.place import place as place
     from brachis.apps.recording import import_motion as import_motion
     from brachis.apps.sweeps import SweepResult as SweepResult
     from brachis.apps.sweeps import sweep as sweep
@@ -110,6 +113,7 @@ _NAMES = {
     "apps.comparison": "Comparison Tracking compare compare_run",
     "apps.controller": "Profile RunReport load_profile profile_names verify_run",
     "apps.controller_plan": "plan_for_controller",
+    "apps.place": "Placing place",
     "apps.recording": "import_motion",
     "apps.sweeps": "SweepResult sweep",
     "apps.view": "view",
