@@ -47,6 +47,8 @@ RANGES = {
     for name, unit in COORDINATES.items()
 }
 """Coordinates for which the user gives ranges: the coordinate of a placement, and its factor to m or rad."""
+_QUICK: TaskKeywords = {"effort": "single", "least_motion": False}
+"""Settings of all plans but the first and the last one."""
 _DESCENTS = 2
 """Number of places from which steps are taken."""
 _FIRST_RADIUS = 0.25
@@ -231,7 +233,7 @@ def place(
         place_found, after = best
         if after is not before:
             report("planning the task at the best place")
-            after = _faster(after, search.plan_at(robot, place_found))
+            after = _faster(after, search.plan_at(robot, place_found, is_final=True))
     return Placing(
         search.moved, search.change_at(place_found), before, after, tuple(search.trials)
     )
@@ -402,9 +404,8 @@ class _Search:
         self.report(f"planning at {len(places)} other places")
         tasks = [self.task_at(u) for u in places]
         robots = [_robot_at(robot, task) for task in tasks]
-        outcomes = plan_many(
-            list(zip(robots, tasks, strict=True)), jobs=jobs, progress=False
-        )
+        pairs = list(zip(robots, tasks, strict=True))
+        outcomes = plan_many(pairs, jobs=jobs, progress=False, **_QUICK)
         for u, outcome in zip(places, outcomes, strict=True):
             result = self._keep(u, outcome)
             if result is not None:
@@ -412,14 +413,24 @@ class _Search:
         return found
 
     def plan_at(
-        self, robot: Robot, u: np.ndarray, known: Result | None = None
+        self,
+        robot: Robot,
+        u: np.ndarray,
+        known: Result | None = None,
+        *,
+        is_final: bool = False,
     ) -> Result | None:
-        """Plan at a place, from a known motion; None without a verified motion."""
+        """Plan at a place, from a known motion; None without a verified motion. The final plan is not a quick one."""
         task = self.task_at(u)
         moved = _robot_at(robot, task)
         try:
             outcome: Result | BrachisError = plan(
-                moved, task, start_from=known, progress=False, check_advice=False
+                moved,
+                task,
+                start_from=known,
+                progress=False,
+                check_advice=False,
+                **({} if is_final else _QUICK),
             )
         except BrachisError as error:
             outcome = error
