@@ -32,12 +32,40 @@ UNSURE = 5e-5
 """Ratios that are so near to what is allowed decide nothing: the two verdicts may differ by rounding."""
 DECIMALS = {"kuka_rsi_4ms": 8, "fanuc_stream_8ms": 5}
 DEGREES = ("kuka_rsi_4ms", "abb_egm_4ms", "fanuc_stream_8ms", "staubli_val3")
+KINDS = (
+    "position",
+    "velocity",
+    "acceleration",
+    "jerk",
+    "torque",
+    "torque_rate",
+    "power",
+    "rms_torque",
+)
 FRANKA = {
     "velocity": [2.175] * 4 + [2.61] * 3,
     "acceleration": [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0],
     "jerk": [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0],
     "torque_rate": [1000.0] * 7,
 }
+
+
+def with_more_limits(
+    robot: brachis.Robot, name: str, seed: int
+) -> tuple[brachis.Robot, dict[str, object]]:
+    """Add limits on heat and power, different limits in the two directions, and a tool speed to every other draw."""
+    rng = np.random.default_rng([56, seed])
+    if rng.random() < 0.5:
+        return robot, {}
+    torque = robot.limits.torque
+    speed = np.where(np.isfinite(robot.limits.velocity), robot.limits.velocity, 5.0)
+    pairs = np.column_stack([-rng.uniform(0.5, 1.0, robot.n) * speed, speed])
+    limits = {"velocity": pairs.tolist()}
+    if name != "scara3":
+        limits["power"] = (rng.uniform(0.1, 0.5) * torque * speed).tolist()
+        limits["rms_torque"] = (rng.uniform(0.6, 1.0) * torque).tolist()
+    tool_limits = {"speed": float(rng.uniform(0.1, 1.0))}
+    return robot.with_limits(**limits), {"tool_limits": tool_limits}
 
 
 def plan_of(seed: int) -> brachis.Trajectory | None:
@@ -61,9 +89,10 @@ def plan_of(seed: int) -> brachis.Trajectory | None:
         space = ["x", "y"] if name == "scara3" else "position"
         along = rng.uniform(-0.2, 0.2, len(space) if name == "scara3" else 3)
         options |= {"path": brachis.Line(by=along.tolist()), "task_space": space}
+    robot, more_options = with_more_limits(robot, name, seed)
     try:
         result = brachis.plan(
-            robot, start=start.tolist(), check_advice=False, **options
+            robot, start=start.tolist(), check_advice=False, **options, **more_options
         )
     except BrachisError:
         return None
@@ -123,41 +152,60 @@ def torques(motion: brachis.Trajectory, *states: np.ndarray) -> np.ndarray:
 
 
 def worst_ratio(motion: brachis.Trajectory, profile: str, t, q, rates) -> float:
-    """Largest ratio to the limits of the robot and of the profile."""
-    limits = {
-        kind: np.minimum(-lower, upper)
-        for kind in ("velocity", "acceleration", "jerk", "torque_rate", "torque")
-        for lower, upper in [motion.robot.limits.both_ways(kind)]
-    }
+    """Largest ratio to the limits of the robot, of the tool and of the profile."""
+    limits = {kind: motion.robot.limits.both_ways(kind) for kind in KINDS}
     if profile == "franka_1khz":
-        limits |= {kind: np.minimum(limits[kind], FRANKA[kind]) for kind in FRANKA}
+        for kind, largest in FRANKA.items():
+            lower, upper = limits[kind]
+            limits[kind] = (
+                np.maximum(lower, np.negative(largest)),
+                np.minimum(upper, largest),
+            )
+
+    def ratio(values: np.ndarray, kind: str) -> float:
+        """Largest ratio of values, (K, n), to limits in both directions."""
+        lower, upper = limits[kind]
+        return np.maximum(values / lower, values / upper).max()
+
+    h = t[1]
     if rates is not None:
         pieces = BPoly.from_derivatives(t, np.concatenate([q[:, None], rates], axis=1))
-        dense = np.union1d(np.linspace(0.0, t[-1], 4001), t)
-        states = [pieces(dense, nu=order) for order in range(3)]
-        ratios = [
-            np.abs(states[1]) / limits["velocity"],
-            np.abs(states[2]) / limits["acceleration"],
-            np.abs(torques(motion, *states)) / limits["torque"],
-        ]
-        return float(max(ratio.max() for ratio in ratios))
-    h = t[1]
-    ratios = []
-    for order, kind in enumerate(("velocity", "acceleration", "jerk"), start=1):
-        held = np.pad(q, ((order - 1, order - 1), (0, 0)), mode="edge")
-        ratios.append(np.abs(np.diff(held, order, axis=0)) / h**order / limits[kind])
-    qdot = np.zeros_like(q)
-    qdot[1:-1] = (q[2:] - q[:-2]) / (2.0 * h)
-    qddot = np.zeros_like(q)
-    qddot[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / h**2
-    qddot[0] = 2.0 * (q[1] - q[0]) / h**2
-    qddot[-1] = 2.0 * (q[-2] - q[-1]) / h**2
+        t = np.union1d(np.linspace(0.0, t[-1], 4001), t)
+        q, qdot, qddot = (pieces(t, nu=order) for order in range(3))
+        ratios = [ratio(qdot, "velocity"), ratio(qddot, "acceleration")]
+    else:
+        ratios = []
+        for order, kind in enumerate(("velocity", "acceleration", "jerk"), start=1):
+            held = np.pad(q, ((order - 1, order - 1), (0, 0)), mode="edge")
+            ratios.append(ratio(np.diff(held, order, axis=0) / h**order, kind))
+        qdot = np.zeros_like(q)
+        qdot[1:-1] = (q[2:] - q[:-2]) / (2.0 * h)
+        qddot = np.zeros_like(q)
+        qddot[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / h**2
+        qddot[0] = 2.0 * (q[1] - q[0]) / h**2
+        qddot[-1] = 2.0 * (q[-2] - q[-1]) / h**2
     tau = torques(motion, q, qdot, qddot)
-    ratios += [
-        np.abs(tau) / limits["torque"],
-        np.abs(np.diff(tau, axis=0)) / h / limits["torque_rate"],
-    ]
-    return float(max(ratio.max() for ratio in ratios))
+    if rates is None:
+        ratios.append(ratio(np.diff(tau, axis=0) / h, "torque_rate"))
+        heat = np.mean(tau**2, axis=0)
+    else:
+        heat = np.trapezoid(tau**2, t, axis=0) / t[-1]
+    lowest, highest = np.clip(limits["position"], -1e6, 1e6)
+    middle = 0.5 * (lowest + highest)
+    half = 0.5 * (highest - lowest)
+    turned = np.abs(q - middle) / half
+    places, _ = motion.robot.tool_placements(q)
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(t)
+    return float(
+        max(
+            *ratios,
+            ratio(tau, "torque"),
+            ratio(tau * qdot, "power"),
+            ratio(np.sqrt(heat), "rms_torque"),
+            turned.max(),
+            speeds.max() / (motion.task.tool_limits.speed or np.inf),
+        )
+    )
 
 
 def check(
@@ -193,7 +241,7 @@ def check(
     ratio = worst_ratio(motion, profile, t, q, rates)
     said = [
         check
-        for check in report.verification.checks
+        for check in report.checks
         if check.name not in ("path error", "acceleration at the ends")
     ]
     keeps_limits = all(check.passed for check in said)

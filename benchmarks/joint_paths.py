@@ -110,9 +110,7 @@ def main() -> None:
                 processor_time() - began,
             )
         active.update(
-            c.name
-            for c in result.verification.checks
-            if c.of_limit and c.value > ACTIVE
+            c.name for c in result.verification.checks if c.limit and c.value > ACTIVE
         )
         robot, *points = _points(example, result.task)
         for intervals in THEIRS:

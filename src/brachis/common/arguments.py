@@ -206,3 +206,12 @@ def check_most(
             allowed=f"at most {largest:g} {unit}",
             hint=hint,
         )
+
+
+def check_once(kind: str, names: Sequence[str], where: str) -> None:
+    """Refuse names that are given twice, with an `InputError`."""
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"{kind} {name!r} is given twice", where=where, allowed="each name once"
+            )

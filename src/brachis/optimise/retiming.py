@@ -17,6 +17,7 @@ from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.path_phase import PathPhase, violation_of_postures
 from brachis.optimise.path_program import PathProgram
+from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
@@ -30,6 +31,9 @@ _MOST_INTERVALS = 256
 minute and gains only 0.2 %."""
 _LEAST_INTERVALS = 4
 """Minimum number of intervals of a redundant curve in a phase, however short the phase."""
+_FEWER_IN_MOVES = 4
+"""Divisor of the number of intervals in a move, at as many places. No path bends the curves of a move: with 16
+intervals, moves of an iiwa14 round obstacles were as fast as with 4, and took 2 to 4 times as long."""
 _PLACES_AN_INTERVAL = 3.5
 """Number of places along the path, per interval, at which limits are imposed."""
 _NARROWED = 4
@@ -311,6 +315,12 @@ def improve_joint_paths(
     return best
 
 
+def _divisor_of(phase: Phase) -> int:
+    """Return the divisor of the number of intervals: more than 1 only in a move, in which all joints are redundant."""
+    joint_map = phase.joint_map
+    return _FEWER_IN_MOVES if joint_map.r == joint_map.robot.n else 1
+
+
 def _better(
     program: Program,
     solve: SolverSession,
@@ -324,6 +334,7 @@ def _better(
         share = phase_timing.t_end / best.t_end
         count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
         stations = int(_PLACES_AN_INTERVAL * count)
+        count = max(_LEAST_INTERVALS, count // _divisor_of(phase))
         phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)

@@ -87,6 +87,17 @@ class ProblemChain(Problem):
             is_closed=is_closed,
         )
 
+    def reordered(self, order: Sequence[int]) -> ProblemChain:
+        """Return the chain with its parts in another order."""
+        chained = tuple(self.chained[number] for number in order)
+        return replace(
+            self,
+            chained=chained,
+            sections=tuple(self.sections[number] for number in order),
+            legs=tuple(leg for part in chained for leg in part.legs),
+            time_laws=tuple(law for part in chained for law in part.time_laws),
+        )
+
     @property
     def is_chain(self) -> bool:
         """True: the motion consists of the motions of the parts."""

@@ -50,7 +50,7 @@ def bind_task(
     whole = Problem.of(robot, task, own_limits)
     if not task.program:
         return whole
-    ways = list(_ways(task))
+    ways = list(_ways(task) if task.order == "given" else _free_ways(task))
     ends = [way.end for way in ways]
     if ends[-1] == "free":
         ends[-1] = task.start if task.end == "start" else task.end
@@ -136,6 +136,18 @@ def _ways(task: Task) -> Iterator[_Way]:
         way = _Way(payload, [numbered])
     if way is not None:
         yield way
+
+
+def _free_ways(task: Task) -> Iterator[_Way]:
+    """Yield every path of a program whose order is free, with a move before, between and after them as needed."""
+    payload = task.robot.payload
+    move = (0, MovePart(move=NEXT, name="move"))
+    for number, part in enumerate(task.program):
+        if number or task.start != "free":
+            yield _Way(payload, [move])
+        yield _Way(payload, [(number, part)])
+    if task.end != "free":
+        yield _Way(payload, [move])
 
 
 def _robot_of(robot: Robot, way: _Way) -> Robot:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -38,6 +39,12 @@ class Chain:
         axes = sliding + turning  # one of them is zero
         return cls(np.array(placements), axes, np.any(turning, axis=1))
 
+    @cached_property
+    def _skews(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The matrix of the cross product with each axis, and its square."""
+        skews = [pin.skew(axis) for axis in self.axes]
+        return [(skew, skew @ skew) for skew in skews]
+
     def place(self, q: np.ndarray) -> Placed:
         """Compute the placements of the joints in postures, (K, n)."""
         count, n = q.shape
@@ -45,16 +52,18 @@ class Chain:
         origins = np.empty((count, n + 1, 3))
         rotations[:, 0] = np.eye(3)
         origins[:, 0] = 0.0
+        sines = np.sin(q)
+        versines = 1.0 - np.cos(q)
         for j in range(n):
             placement = self.placements[j]
             before = rotations[:, j]
             turned = before @ placement[:3, :3]
             origin = origins[:, j] + before @ placement[:3, 3]
             if self.revolute[j]:
-                skew = pin.skew(self.axes[j])
-                sine = np.sin(q[:, j])[:, None, None]
-                versine = (1.0 - np.cos(q[:, j]))[:, None, None]
-                turned = turned @ (np.eye(3) + sine * skew + versine * (skew @ skew))
+                first, second = self._skews[j]
+                sine = sines[:, j, None, None]
+                versine = versines[:, j, None, None]
+                turned = turned @ (np.eye(3) + sine * first + versine * second)
             else:
                 origin = origin + (turned @ self.axes[j]) * q[:, j, None]
             rotations[:, j + 1] = turned

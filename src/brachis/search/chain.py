@@ -6,8 +6,9 @@ the limits of the postures at which it ends. The best chains are improved as a w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,13 +22,18 @@ from brachis.problem.problem import Decomposition, Decompositions, Problem
 from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_charts
 from brachis.search.joint_path import DeadEnd
 from brachis.search.lattice import step_lengths
-from brachis.search.moves import guess_along
+from brachis.search.moves import move_guesses
+from brachis.search.order import find_orders
 from brachis.search.schedule import Batch, batches, has_charts
 from brachis.search.screening import screen
 from brachis.search.stages import ChainGuess, InitialGuess
 
 _SHARE = 0.4
 """Fraction of the remaining time in which the joint paths of all paths are sought."""
+_NODES = 8
+"""Number of joint paths of each path among which the best order is sought."""
+_TRIED = 6
+"""Number of chains after which none is passable."""
 _SCREENED = 3
 """Number of chains that are improved for each one that is kept."""
 
@@ -101,8 +107,15 @@ class _ChainSearch:
     deadline: Deadline
     listener: Listener
 
+    @property
+    def _level_of_moves(self) -> SearchLevel:
+        """Level at which joint paths of moves round obstacles are sought."""
+        return replace(self.level, in_charts=1)
+
     def best_guesses(self) -> list[ChainGuess]:
         """Return guesses of the whole program, the fastest first."""
+        if self.problem.task.order == "free":
+            return self._guesses_in_any_order()
         parts = self.problem.parts
         start = self.problem.start
         first = 0
@@ -122,10 +135,93 @@ class _ChainSearch:
         order = [*range(first, len(parts)), *range(first)]
         chains = self._extend(chains, order)
         chains = sorted(chains, key=lambda chain: chain.time)
-        return [
-            self._guess(chain, order)
-            for chain in chains[: _SCREENED * self.level.in_charts]
+        return self._passable(partial(self.guess_of, order=order), chains)
+
+    def _passable(
+        self, guess_of: Callable[[_Chain], ChainGuess], chains: Sequence[_Chain]
+    ) -> list[ChainGuess]:
+        """Return the guesses of the best chains whose moves get round what is in their way."""
+        found: list[ChainGuess] = []
+        blocked: list[PathError] = []
+        for chain in chains:
+            if len(found) == _SCREENED * self.level.in_charts:
+                break
+            if len(blocked) == _TRIED and not found:
+                break
+            try:
+                found.append(guess_of(chain))
+            except PathError as error:
+                blocked.append(error)
+        if not found:
+            raise blocked[0]
+        return found
+
+    def _guesses_in_any_order(self) -> list[ChainGuess]:
+        """Return guesses of the whole program in the best orders of its paths, the fastest first."""
+        problem = self.problem
+        parts = problem.parts
+        paths = [number for number, part in enumerate(parts) if part.task_map.m]
+        move = next(part for part in parts if not part.task_map.m)
+        nodes: list[tuple[int, _Option]] = []
+        for number in paths:
+            beside = [_Chain((option,)) for _, option in nodes]
+            if problem.start is not None:
+                beside.append(_Chain((_Option(np.array([problem.start] * 2)),)))
+            options = sorted(
+                self._options(number, beside), key=lambda option: option.time
+            )
+            nodes += [(number, option) for option in options[:_NODES]]
+        groups = np.array([paths.index(number) for number, _ in nodes])
+        times = np.array([option.time for _, option in nodes])
+        begins = np.array([option.ends[0] for _, option in nodes])
+        ends = np.array([option.ends[1] for _, option in nodes])
+        prices = (
+            np.array([price_moves(move, ends, begin) for begin in begins]).T + times
+        )
+        zeros = np.zeros(len(nodes))
+        count = _SCREENED * self.level.in_charts
+        if problem.is_closed:
+            found = []
+            for root in np.flatnonzero(groups == 0):
+                first = np.where(np.arange(len(nodes)) == root, times, np.inf)
+                back = price_moves(move, ends, begins[root])
+                found += find_orders(prices, first, back, groups, count)
+        else:
+            start, end = problem.start, problem.end
+            first = times + (
+                zeros if start is None else price_moves(move, begins, start)
+            )
+            last = zeros if end is None else price_moves(move, ends, end)
+            found = find_orders(prices, first, last, groups, count)
+        found.sort(key=lambda way: way[0])
+        chains = [
+            _Chain(tuple(nodes[node][1] for node in way), time) for time, way in found
         ]
+        orders = {
+            id(chain): [nodes[node][0] for node in way]
+            for chain, (_, way) in zip(chains, found, strict=True)
+        }
+        return self._passable(
+            lambda chain: self._guess_in_order(chain, orders[id(chain)]), chains
+        )
+
+    def _guess_in_order(self, chain: _Chain, visited: Sequence[int]) -> ChainGuess:
+        """Return the guess of the program with its paths, given by their numbers, in an order."""
+        problem = self.problem
+        paths = iter(visited)
+        order = [
+            next(paths) if part.task_map.m else number
+            for number, part in enumerate(problem.parts)
+        ]
+        options = list(chain.options)
+        if problem.start is not None:
+            options.insert(0, _Option(np.array([problem.start] * 2)))
+        if problem.end is not None:
+            options.append(_Option(np.array([problem.end] * 2)))
+        elif problem.is_closed:
+            options.append(_Option(options[0].ends[[0, 0]]))
+        search = replace(self, problem=problem.reordered(order))
+        return search.guess_of(_Chain(tuple(options), chain.time), range(len(order)))
 
     def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
         """Continue chains with parts, given by their numbers."""
@@ -185,9 +281,8 @@ class _ChainSearch:
         With a start posture, all begin there.
         """
         part = self.problem.parts[number]
-        self.listener(
-            f"looking for joint paths of {self.problem.sections[number][0].name}"
-        )
+        name = self.problem.sections[number][0].name
+        self.listener(f"looking for joint paths of {name}")
         before = [chain.options[-1].ends[-1] for chain in chains if chain.options]
         after = None
         if number + 1 < len(self.problem.parts):
@@ -199,7 +294,7 @@ class _ChainSearch:
         changed = replace(
             part, beside=beside, start=part.start if start is None else start
         )
-        guesses = self._guesses(changed)
+        guesses = self._guesses(changed, name)
         return [
             _Option(
                 guess.postures_at(np.array([0.0, 1.0]))[:, : self.problem.robot.n],
@@ -209,20 +304,28 @@ class _ChainSearch:
             for guess in guesses
         ]
 
-    def _guesses(self, part: Problem) -> list[InitialGuess]:
+    def _guesses(self, part: Problem, name: str) -> list[InitialGuess]:
         """Find joint paths of a path."""
         own = Decompositions(part, self.families)
+        dead_ends: list[DeadEnd] = []
         if has_charts(part, own):
             found = joint_paths_in_charts(part, own, self.level, self.deadline)
             if not isinstance(found, DeadEnd):
                 return found
+            dead_ends.append(found)
         for batch in batches(part, own, self.deadline, self.listener):
             if batch.guesses:
                 return list(batch.guesses)
-        raise PathError("no joint path was found", where="program")
+            dead_ends += [dead_end for _, dead_end in batch.lattices]
+        why = f": {dead_ends[0]}" if dead_ends else ""
+        raise PathError(
+            f"no joint path of {name} was found{why}",
+            s_interval=dead_ends[0].interval if dead_ends else None,
+            where="program",
+        )
 
-    def _guess(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
-        """Return the guess of a chain, with straight joint lines as moves."""
+    def guess_of(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
+        """Return the guess of a chain; raise PathError if no move gets round what is in its way."""
         options = list(chain.options)
         guesses: dict[int, InitialGuess] = {}
         here = None if self.problem.start is None else options.pop(0).ends[-1]
@@ -234,8 +337,10 @@ class _ChainSearch:
                 guesses[number] = option.guess
             else:
                 assert here is not None
-                postures = np.array([here, option.ends[0]])
-                guesses[number] = guess_along(part, postures, "line")
+                move = replace(part, start=here, end=option.ends[0])
+                known = (self._level_of_moves, self.deadline, self.listener)
+                guess = move_guesses(move, *known)[0]
+                guesses[number] = replace(guess, problem=part)
             if part.task_map.m or option.guess is None:
                 options.pop(0)
             here = option.ends[-1] if part.task_map.m else option.ends[0]

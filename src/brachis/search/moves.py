@@ -5,23 +5,46 @@ from __future__ import annotations
 import numpy as np
 
 from brachis.common.arrays import interpolate_columns
-from brachis.errors import TaskError
+from brachis.common.deadline import Deadline
+from brachis.common.progress import Listener
+from brachis.errors import PathError, TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
 from brachis.problem.problem import Problem
+from brachis.search.guesses import SCREENED, SearchLevel
+from brachis.search.holding import explain_postures
 from brachis.search.phase_plane import least_time
+from brachis.search.sampled_paths import FreeSpace, sample_joint_path
+from brachis.search.screening import screen_coarsely
 from brachis.search.stages import InitialGuess
 
+_SAMPLES = 3000
+"""Number of samples after which OMPL gives up. For an iiwa14 behind walls, they take 1.5 s."""
+_TRIES = 3
+"""Number of times that OMPL may give up before there is no joint path."""
 _STATIONS = 97
 """Number of postures along the joint path of a guess."""
 
 
-def move_guesses(problem: Problem) -> list[InitialGuess]:
-    """Find joint paths of a move between two given postures.
+def move_guesses(
+    problem: Problem, level: SearchLevel, deadline: Deadline, listener: Listener
+) -> list[InitialGuess]:
+    """Find joint paths of a move: the straight one, or if something is in its way, the most promising ones round it.
+
+    Parameters
+    ----------
+    problem : Problem
+    level : SearchLevel
+    deadline : Deadline
+    listener : callable
 
     Raises
     ------
     TaskError
         The start or end posture is missing.
+    PathError
+        No joint path was found.
+    NotInstalledError
+        Something is in the way, and OMPL is missing.
     """
     for end in ("start", "end"):
         if end not in problem.given_postures:
@@ -31,7 +54,43 @@ def move_guesses(problem: Problem) -> list[InitialGuess]:
                 found="free",
                 allowed="a posture",
             )
-    return [guess_along(problem, np.array([problem.start, problem.end]), "line")]
+    ends = np.array([problem.start, problem.end])
+    straight = guess_along(problem, ends, "line")
+    space = FreeSpace.of(problem)
+    if space.joins(*ends):
+        return [straight]
+    guesses: list[InitialGuess] = []
+    for seed in range(1, 1 + SCREENED * level.in_charts):
+        if seed > _TRIES and not guesses:
+            break
+        listener(f"sampling joint path {seed} round what is in the way")
+        q = sample_joint_path(problem, space, seed, _SAMPLES, deadline)
+        if q is not None:
+            guesses.append(guess_along(problem, q, f"RRT-Connect {seed}"))
+    if not guesses:
+        raise _explain_blocked(straight)
+    count = max(1, level.in_charts // 2)
+    return screen_coarsely(guesses, count, deadline, listener)
+
+
+def _explain_blocked(straight: InitialGuess) -> PathError:
+    """Tell what is in the way of a straight joint path round which no other was found."""
+    cause = explain_postures([straight])
+    problem = "no joint path from the start to the end posture was found"
+    if cause is None or cause.s_interval is None:
+        return PathError(problem, where="task_space: free")
+    middle = np.array([np.mean(cause.s_interval)])
+    posture = ", ".join(
+        f"{position:.3g}" for position in straight.postures_at(middle)[0]
+    )
+    return PathError(
+        f"{problem}, and on the straight one {cause.problem}",
+        s_interval=cause.s_interval,
+        where="task_space: free",
+        found=f"{cause.found}, near the posture [{posture}]",
+        allowed=cause.allowed,
+        hint="Move what is in the way, or choose other postures",
+    )
 
 
 def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:

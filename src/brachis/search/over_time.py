@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.limits.safeguards import HELD_BACK
 from brachis.optimise.backends import SolverReport, SolveStatus
@@ -23,6 +24,7 @@ from brachis.optimise.improve import (
     keep_feasible,
 )
 from brachis.optimise.mesh import coarsest
+from brachis.optimise.path_phase import violation_of_postures
 from brachis.optimise.phase_timing import PhaseTiming, time_phases
 from brachis.optimise.program import Program
 from brachis.optimise.retiming import (
@@ -47,6 +49,8 @@ _WIDENING = 1e-6
 s took 4 s without widening."""
 _NEARLY = 0.01
 """Maximum violation that is accepted if the iteration limit ends a solve; refinement can remove it."""
+_LOOKS = 10
+"""Number of instants in each interval at which limits on postures are checked."""
 _FIRST_LOSS = 0.05
 """Fraction of the motion time that the first knots may cost, if a mesh is refined from them."""
 _FIRST_INTERVALS = 16
@@ -200,10 +204,24 @@ def improve_timings(
     unrestricted = solved.program.with_phases(
         phase.with_limits(original.limits) for phase, original in pairs
     )
-    timings = time_phases(unrestricted, meet(unrestricted, solved.x))
-    if least_time(timings) < paths.t_end:
+    x = meet(unrestricted, solved.x)
+    timings = time_phases(unrestricted, x)
+    is_faster = least_time(timings) < paths.t_end
+    # Between its points, the solution may exceed limits on postures, which no timing of its joint path can meet.
+    allowed = max(paths.violation, guess.problem.task.refinement.tolerance)
+    if is_faster and _violation_of_postures(unrestricted, x) <= allowed:
         return BetterTimings(unrestricted, timings, solved)
     return replace(unimproved, solved=solved)
+
+
+def _violation_of_postures(program: Program, x: np.ndarray) -> float:
+    """Return the largest violation of limits on postures along a motion, (v,)."""
+    violations = []
+    for phase, x_of_phase in program.split(x):
+        motion = phase.motion(x_of_phase)
+        t = spread(motion.breaks, _LOOKS)
+        violations.append(violation_of_postures(phase, motion.at(t)[0]))
+    return max(violations)
 
 
 def _solve_from_timings(

@@ -180,8 +180,8 @@ class Search:
     def _find_first_motion(
         self, guesses: Sequence[InitialGuess], deadline: Deadline
     ) -> None:
-        """Find a motion close to the joint path of a guess, unless a motion is known."""
-        if not self._has_motion:
+        """Find a motion close to the joint path of a guess, unless a motion is known; none for a program."""
+        if not (self._has_motion or self._problem.is_chain):
             self._reserve = -_LATER
             self._first_motion = find_first_motion_of(guesses, deadline, self._listener)
 

@@ -97,20 +97,19 @@ def batches(
     """
     solvers = [solver.name for solver in solvers_for(problem.task.solver.name)]
     levels = SEARCH_LEVELS[problem.task.search.effort]
+    if not problem.task_map.m:
+        find = partial(_guess_moves, problem, deadline, listener)
+        yield from _batches_with_fallbacks(levels, solvers, find)
+        return
     if not problem.task_map.is_of_tool:
-        is_move = not problem.task_map.m
-        guesses = move_guesses(problem) if is_move else [joint_space_guess(problem)]
-        refuse_hopeless(guesses)
-        for solver in solvers:
-            is_first = solver == solvers[0]
-            solver_guesses = _with_solvers(guesses, [solver])
-            yield Batch(solver_guesses, len(guesses), fallback=not is_first)
+        guess = joint_space_guess(problem)
+        refuse_hopeless([guess])
+        for number, solver_guess in enumerate(_with_solvers([guess], solvers)):
+            yield Batch([solver_guess], 1, fallback=number > 0)
         return
     if has_charts(problem, decompositions):
         find = partial(_guess_in_charts, problem, decompositions, deadline, listener)
-        guesses = yield from _level_by_level(levels, solvers, find)
-        for solver in solvers[1:]:
-            yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+        yield from _batches_with_fallbacks(levels, solvers, find)
         levels = tuple(replace(level, fallback=True) for level in levels)
     if not decompositions:
         return
@@ -135,6 +134,17 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
     return problem.r > 0 or not decompositions
 
 
+def _batches_with_fallbacks(
+    levels: Sequence[SearchLevel],
+    solvers: Sequence[str],
+    find: Callable[[SearchLevel], GuessesAndLattices],
+) -> Iterator[Batch]:
+    """Yield the batches of all levels, then the first guesses with the other solvers."""
+    guesses = yield from _level_by_level(levels, solvers, find)
+    for solver in solvers[1:]:
+        yield Batch(_with_solvers(guesses[:_SIZE], [solver]), len(guesses))
+
+
 def _level_by_level(
     levels: Sequence[SearchLevel],
     solvers: Sequence[str],
@@ -156,6 +166,15 @@ def _level_by_level(
                 [] if first else lattices,
             )
     return guesses
+
+
+def _guess_moves(
+    problem: Problem, deadline: Deadline, listener: Listener, level: SearchLevel
+) -> GuessesAndLattices:
+    """Find guesses of a move."""
+    guesses = move_guesses(problem, level, deadline.part(_LATTICE_SHARE), listener)
+    refuse_hopeless(guesses)
+    return guesses, []
 
 
 def _guess_in_charts(

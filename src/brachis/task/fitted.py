@@ -175,7 +175,8 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
             path += _read(segment, task.task_space, f"{source}: path[{i}]", folder)
         else:
             path.append(segment)
-    return task.model_copy(update={"path": tuple(path)})
+    # The empty path of a move stays unset: a task with path: [] is wrong.
+    return task.model_copy(update={"path": tuple(path)}) if path else task
 
 
 def _read(

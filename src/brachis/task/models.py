@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from operator import attrgetter
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -126,6 +126,8 @@ class Task(CheckedModel):
     program: tuple[ProgramPart, ...] = ()
     """Parts that follow one another, in place of a path: {path: ...}, {move: ...}, {approach: ...}, {retract: ...},
     {dwell: ...} or {payload: ...}. task_space is then that of the paths. end: start closes the motion."""
+    order: Literal["given", "free"] = "given"
+    """Order of the paths of a program. free: the planner chooses the order, and adds the moves between them."""
     frames: dict[Name, FramePlacement] = Field(default={})
     """Placements of frames, for example of workpieces, by name: {xyz: ..., rpy_deg: ..., frame: ...}."""
     postures: Annotated[
@@ -224,7 +226,7 @@ class Task(CheckedModel):
         self._check_names()
         if self.task_space == "free":
             yield from self._changed(_OF_PATHS, "a move has no path")
-            yield from find_mistakes(self.program)
+            yield from find_mistakes(self.program, self.order)
         elif self.path:
             yield from self._mistakes_at_the_start()
             yield from self._mistakes_in_the_path()

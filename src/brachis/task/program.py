@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from brachis.common.words import write_count
 from brachis.task.fields import (
     ByForm,
     ByKey,
@@ -180,8 +181,15 @@ def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
     return {"start": "free", **content, "program": parts, "task_space": "free"}
 
 
-def find_mistakes(parts: Sequence[Part]) -> Iterator[Mistake]:
+_MOST_FREE = 12
+"""Maximum number of paths whose order is free."""
+
+
+def find_mistakes(parts: Sequence[Part], order: str) -> Iterator[Mistake]:
     """Yield the mistakes in the order of a program's parts."""
+    if order == "free":
+        yield from _find_mistakes_if_free(parts)
+        return
     kinds = [part.kind for part in parts if part.kind in _WAYS]
     numbers = [i for i, part in enumerate(parts) if part.kind in _WAYS]
     for number, before, kind, after in zip(
@@ -215,3 +223,21 @@ def find_mistakes(parts: Sequence[Part]) -> Iterator[Mistake]:
             )
     if parts and not kinds:
         yield "program", "nothing moves", "at least one path or move"
+
+
+def _find_mistakes_if_free(parts: Sequence[Part]) -> Iterator[Mistake]:
+    """Yield the mistakes in a program whose order is free."""
+    paths = [part for part in parts if isinstance(part, PathPart)]
+    if not 2 <= len(paths) <= _MOST_FREE:
+        yield (
+            "order",
+            f"the order of {write_count(len(paths), 'path')} cannot be free",
+            f"2 to {_MOST_FREE} paths",
+        )
+    for number, part in enumerate(parts):
+        if not isinstance(part, PathPart):
+            yield (
+                f"program[{number}]",
+                "with order: free, the planner adds everything between the paths",
+                "paths only",
+            )

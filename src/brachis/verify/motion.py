@@ -276,6 +276,8 @@ class CheckedMotion:
     task_map : TaskMap
     path : Path
     options : VerifyOptions
+    is_sampled : bool
+        Whether the motion is known only at its nodes, so that it is checked only there.
     """
 
     trajectory: Trajectory
@@ -283,6 +285,7 @@ class CheckedMotion:
     task_map: TaskMap
     path: Path
     options: VerifyOptions
+    is_sampled: bool = False
 
     @property
     def task(self) -> Task:
@@ -297,6 +300,8 @@ class CheckedMotion:
     @cached_property
     def states(self) -> MotionStates:
         """The motion at all instants at which it is checked."""
+        if self.is_sampled:
+            return MotionStates(self.pieces, *self.pieces.place(self.pieces.times))
         return MotionStates.at(self.pieces, *_all_places(self))
 
     @cached_property

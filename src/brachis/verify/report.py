@@ -65,8 +65,8 @@ class Check:
         Time of the worst value, s.
     remark : str
         Note on the check; often empty.
-    of_limit : bool
-        Whether the check compares the motion with a limit, so that `value` is a ratio.
+    limit : str
+        Name of the limit that the check compares the motion with, so that `value` is a ratio; empty for other checks.
     is_kept : bool
         Whether the planner takes this limit into account; otherwise motions are only checked against it.
     """
@@ -79,7 +79,7 @@ class Check:
     subject: str | None = None
     time: float | None = None
     remark: str = ""
-    of_limit: bool = False
+    limit: str = ""
     is_kept: bool = True
 
     def __post_init__(self) -> None:
@@ -99,7 +99,7 @@ class Check:
 
         With `degrees`, angles are in degrees, except values that may be either in rad or in m.
         """
-        ratio = self.of_limit or (self.unit == "-" and self.allowed > 1.0)
+        ratio = self.limit or (self.unit == "-" and self.allowed > 1.0)
         unit, factor = shown_unit(self.unit, degrees=degrees)
         value = factor * self.value
         return (

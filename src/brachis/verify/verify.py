@@ -112,7 +112,7 @@ def verify_trajectory(
     errors, margins = zip(*surveys, strict=True)
     path_check = _check_path(motion, np.concatenate(errors))
     ratios = check_limits(motion, own_limits)
-    names = Counter(check.name.removesuffix(" ratio") for check in ratios)
+    names = Counter(check.limit for check in ratios)
     left_out = Counter(trajectory.own_limits) - names
     if left_out:
         warnings.warn(

@@ -122,17 +122,17 @@ REFUSED = {
     "axes: [{joint: joint_1}]": "moves has no axis in the profile; found rail, joint_2",
     SWAPPED: "not in the order of the chain; found joint_2, joint_1; allowed: joint_1, joint_2",
     "axes: [{joint: joint_7}]": "no joint named 'joint_7'",
-    "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' has two axes",
+    "axes: [{joint: rail, external: true}, {joint: rail}]": "joint 'rail' is given twice",
     "arm: {names: [A1, A2]}": "too few names for axes of the arm; found joint_1",
     "coupled: {A3: {A9: 1}}": "no axis named 'A9'",
-    "arm: {names: [A1, A1, A3, A4, A5, A6]}": "two axes have one name; found A1",
+    "arm: {names: [A1, A1, A3, A4, A5, A6]}": "axis 'A1' is given twice",
     "coupled: {A3: {A3: -1}}": "the axes do not determine the joints",
     "limits: {total_power: 5}": "a profile cannot contain this limit",
     "period: 4": "period: out of range; found 4; allowed: <= 0.1",
     "formats: [krl]": "no format of samples named 'krl'",
     "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
     "events: {start: x}": "no event with this name",
-    "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6",
+    "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6, for the arm; limits of external axes",
 }
 
 
@@ -152,7 +152,7 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
         ({"moves": "linear"}, "samples have no moves"),
         (
             {"form": "json"},
-            r"not accept this format; found json; allowed: csv \(.csv\), program \(.src\)",
+            "no format of KUKA.* named 'json'; allowed: csv, program",
         ),
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         (
@@ -248,3 +248,16 @@ def test_a_wrong_template_is_an_error(template, message, turn, tmp_path):
     path = own_profile(tmp_path, f"program: {{template: '{template}'}}")
     with pytest.raises(InputError, match=message):
         brachis.export.write_for_controller(turn, tmp_path / "run.src", path)
+
+
+def test_a_list_of_limits_is_for_the_arm_and_a_mapping_for_all_axes(turn, tmp_path):
+    values = [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    by_joint = "{joint_1: 0.9, rail: 0.4}"
+    expected = {str(values): values, by_joint: [0.9]}
+    for text, arm in expected.items():
+        path = own_profile(tmp_path, f"limits: {{velocity: {text}}}")
+        profile = brachis.load_profile(path)
+        axes = bind_axes(profile, turn.robot)
+        stricter = robot_with_profile(turn.robot, profile, axes).limits.velocity
+        np.testing.assert_allclose(stricter[1 : 1 + len(arm)], arm)
+    assert stricter[0] == 0.4

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import brachis
-from support.controllers import RAIL_START
+from support.controllers import BLEND, RAIL_START, deviation
 from support.effort import QUICK
 
 NUMBER = r"(-?\d+\.?\d*(?:e-?\d+)?)"
-BLEND = 0.25
 
 
 def numbers(text):
@@ -141,52 +140,94 @@ def test_positions_and_times_are_those_of_the_motion(
         )
 
 
-def simulate(times, nodes, rests, t):
-    """Run lines of constant velocity with linear changes of it, by integrating the velocity."""
-    h = np.diff(times)
-    ramps = BLEND * h
-    lines = np.diff(nodes, axis=0)
-    constant = h - 0.5 * ramps * rests[:-1] - 0.5 * ramps * rests[1:]
-    speeds = lines / constant[:, None]
-    knots = []
-    for k in range(len(times)):
-        before = speeds[k - 1] if k else 0.0 * speeds[0]
-        after = speeds[k] if k < len(h) else 0.0 * speeds[0]
-        if rests[k]:
-            if k:
-                knots += [(times[k] - ramps[k - 1], before), (times[k], 0.0 * before)]
-            if k < len(h):
-                knots += [(times[k], 0.0 * after), (times[k] + ramps[k], after)]
-        else:
-            half = BLEND * min(h[k - 1], h[k])
-            knots += [(times[k] - half, before), (times[k] + half, after)]
-    knot_times = np.array([time for time, _ in knots])
-    rates = np.array([rate for _, rate in knots])
-    velocity = np.column_stack([np.interp(t, knot_times, column) for column in rates.T])
-    steps = 0.5 * np.diff(t)[:, None] * (velocity[1:] + velocity[:-1])
-    return nodes[0] + np.vstack([np.zeros_like(nodes[:1]), np.cumsum(steps, axis=0)])
+TOOL = brachis.robots.tx90l_rail.tool_placements(np.array([RAIL_START]))[0][0]
+CENTER = np.add(TOOL, [0.1, 0.1, 0.0])
 
 
-@pytest.mark.parametrize("tolerance, late", [(1e-3, 0.01), (1e-4, 0.05), (0.01, 0.003)])
-def test_the_deviation_is_that_of_a_simulation(tolerance, late, seam, tmp_path):
-    options = {"tolerance": tolerance, "time_tolerance": late}
-    text, report = write(seam, "abb_egm_4ms", tmp_path, **options)
+@pytest.fixture(scope="module")
+def bend():
+    """A line and an arc of the tool, with a dwell between them."""
+    return brachis.plan(
+        "tx90l_rail",
+        path=[
+            {"line": {"by": [0.0, 0.1, 0.0]}, "stop": True, "dwell": 0.2},
+            {"arc": {"center": CENTER.tolist(), "angle_deg": -60, "normal": [0, 0, 1]}},
+        ],
+        start=RAIL_START,
+        task_space="pose",
+        search=QUICK,
+    ).trajectory
+
+
+WAIT = rf"(?:WAIT SEC |WaitTime |WAIT ){NUMBER}"
+
+
+def read_steps(text, profile, largest):
+    """Postures (rail first), times and rests of a program, as its instructions say, in m, rad and s."""
+    positions = iter(READERS[profile][1](text)[0])
+    nodes, durations, rests = [], [], []
+    percent = 100.0
+    speed = None
+    for line in text.splitlines():
+        if found := re.search(r"VEL_AXIS\[I\] = (\d+)", line):
+            percent = float(found[1])
+        elif found := re.search(rf"VEL.CP = {NUMBER}", line):
+            speed = float(found[1])
+        elif found := re.search(WAIT, line):
+            nodes.append(nodes[-1])
+            durations.append(float(found[1]))
+            rests.append(True)
+        elif re.search(r"\b(MoveAbsJ|MoveL|PTP|LIN|[JL] P)\b", line):
+            row = next(positions)
+            posture = np.append(1e-3 * row[6], np.radians(row[:6]))
+            if profile == "fanuc_stream_8ms":
+                posture[3] += posture[2]
+            nodes.append(posture)
+            rests.append(not re.search(r"\\Z:=|CNT100|C_PTP|C_DIS", line))
+            found = re.search(rf"T:={NUMBER}|{NUMBER}msec", line)
+            duration = 0.0
+            if len(nodes) == 1:
+                rests[0] = True
+            elif found:
+                duration = float(found[1] or 1e-3 * float(found[2]))
+            else:
+                ends = nodes[-2:]
+                moved = np.abs(ends[1] - ends[0])
+                constant = np.max(moved / largest) / (0.01 * percent)
+                if speed is not None:
+                    constant = distance(ends) / speed
+                duration = constant / (1.0 - 0.5 * BLEND * sum(rests[-2:]))
+            durations.append(duration)
+    return np.cumsum(durations), np.array(nodes), np.array(rests)
+
+
+def distance(ends):
+    """Distance between the tool's places in two postures, m."""
+    places, _ = brachis.robots.tx90l_rail.tool_placements(np.array(ends))
+    return np.linalg.norm(places[1] - places[0])
+
+
+SIMULATED = ("abb_egm_4ms", "fanuc_stream_8ms", "kuka_rsi_4ms")
+
+
+@pytest.mark.parametrize("tolerance, late", [(1e-3, 0.01), (1e-4, 0.05), (0.01, 0.004)])
+@pytest.mark.parametrize("moves", ["joint", "linear"])
+@pytest.mark.parametrize("profile", SIMULATED)
+def test_the_deviation_is_that_of_a_simulation(
+    profile, moves, tolerance, late, bend, tmp_path
+):
+    """It includes what rounding to percents or milliseconds adds, and a dwell."""
+    options = {"tolerance": tolerance, "time_tolerance": late, "moves": moves}
+    text, report = write(bend, profile, tmp_path, **options)
     assert report.place <= tolerance
     assert report.time <= late
-    positions, durations = read_rapid(text)
-    times = np.cumsum(durations)
-    nodes = np.column_stack([1e-3 * positions[:, 6], np.radians(positions[:, :6])])
-    rests = np.isin(np.arange(len(times)), [0, len(times) - 1])
-    t = np.linspace(0.0, times[-1], 60_001)
-    places, rotations = seam.robot.tool_placements(simulate(times, nodes, rests, t))
-    planned = seam.robot.tool_placements(seam.position(t.clip(max=seam.t_end)))[0]
-    away = np.linalg.norm((places - planned[0])[:, [0, 2]], axis=1)
-    turned = rotations[0].T @ rotations
-    angle = np.arccos(((np.trace(turned, axis1=1, axis2=2) - 1.0) / 2.0).clip(-1, 1))
-    assert report.place == pytest.approx(max(away.max(), angle.max()), rel=0.1)
-    passed = np.interp(places[:, 1], planned[:, 1], t)
-    moving = np.gradient(planned[:, 1], t) > 1e-3 * np.ptp(planned[:, 1]) / seam.t_end
-    assert report.time == pytest.approx(np.abs(passed - t)[moving].max(), rel=0.1)
+    largest = [limit.velocity for limit in bend.robot.urdf_limits]
+    program = read_steps(text, profile, largest)
+    assert sum(program[2]) == 4
+    is_linear = moves == "linear"
+    place, time = deviation(bend, CENTER, program, is_linear=is_linear)
+    assert report.place == pytest.approx(place, rel=0.1)
+    assert report.time == pytest.approx(time, rel=0.1)
 
 
 def test_a_wider_tolerance_needs_fewer_positions(seam, tmp_path):
@@ -282,10 +323,12 @@ def test_speeds_are_percents_of_the_machines_and_of_the_right_external_axis(
     positions = read_krl(text.replace("E2 ", "E1 "))[0]
     percents = [int(row) for row in re.findall(r"VEL_AXIS\[I\] = (\d+)", text)][1:]
     largest = [limit.velocity for limit in seam.robot.urdf_limits]
-    _, durations = read_rapid(write(seam, "abb_egm_4ms", tmp_path)[0])
+    dense = np.linspace(0.0, seam.t_end, 100_001)
+    values = axes_of(seam, "kuka_rsi_4ms", seam.position(dense))
+    times = [dense[np.argmin(np.abs(values - row).max(axis=1))] for row in positions]
     steps = np.abs(np.diff(positions, axis=0))
     way = np.column_stack([1e-3 * steps[:, 6], np.radians(steps[:, :6])])
-    slowest = 100.0 * np.max(way / durations[1:, None] / largest, axis=1)
+    slowest = 100.0 * np.max(way / np.diff(times)[:, None] / largest, axis=1)
     middle = slice(1, -1)  # lines between corners that are passed
     np.testing.assert_allclose(percents[middle], slowest[middle].clip(1.0), atol=0.6)
 

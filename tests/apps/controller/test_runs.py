@@ -19,9 +19,7 @@ def profile_with(name="kuka_rsi_4ms", **changes):
 
 def value_of(report, name):
     """Return the worst value of a check."""
-    return next(
-        check.value for check in report.verification.checks if check.name == name
-    )
+    return next(check.value for check in report.checks if check.name == name)
 
 
 def torques(trajectory, q, qdot, qddot):

@@ -145,7 +145,7 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
         print_lines(
             f"as {report.controller} runs it, every {1e3 * report.period:g} ms:"
         )
-        print_verification(report.verification, degrees=False)
+        print_verification(report, degrees=False)
         remedies = report.remedies
     else:
         print_table("program", ("", ""), report.summary().items())

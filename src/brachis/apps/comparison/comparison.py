@@ -128,12 +128,12 @@ class Comparison(Summary):
     def uses(self) -> tuple[Use, ...]:
         """Fraction of each limit that the two motions use."""
         proven = {bounds.limit: bounds.worst for bounds in self.proven}
-        interpolated = {check.name: check.value for check in self.verification.checks}
+        interpolated = {check.limit: check.value for check in self.verification.checks}
         uses = []
         for check in self.result.verification.checks:
-            limit = check.name.removesuffix(" ratio")
-            if check.of_limit and limit in proven and check.name in interpolated:
-                up_to = max(proven[limit][0], interpolated[check.name])
+            limit = check.limit
+            if limit in proven and limit in interpolated:
+                up_to = max(proven[limit][0], interpolated[limit])
                 planned = (check.value, check.subject or "")
                 uses.append(Use(limit, *proven[limit], up_to, *planned))
         return tuple(uses)

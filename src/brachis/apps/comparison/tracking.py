@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -91,7 +91,7 @@ class Tracking(Summary):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
-        return {**vars(self), "axes": [vars(axis) for axis in self.axes]}
+        return asdict(self)
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user."""
@@ -168,29 +168,27 @@ def compare_run(
             found=f"{joint} deviates by {errors.max():.3g} rad or m from the plan",
             allowed=f"at most {_ANOTHER:g} rad or m; check the profile and the units",
         )
-    torques = None
+    torques: list[float | None] = [None] * len(axes.names)
     if recording.tau is not None and motion.robot.has_masses:
         planned_tau = axes.encode_torques(motion.torque(plan_times))
-        torques = np.abs(recording.tau - planned_tau).max(axis=0)
+        torques = np.abs(recording.tau - planned_tau).max(axis=0).tolist()
     robot = motion.robot
     run_places, _ = robot.tool_placements(robot.of_real_joints(run_q))
     planned_places, _ = robot.tool_placements(robot.of_real_joints(planned_q))
     away = np.linalg.norm(run_places - planned_places, axis=1)
     worst = int(np.argmax(away))
-    rows = tuple(
-        AxisTracking(
-            joint,
-            axes.names[i],
-            float(factors[i] * errors[:, i].max()),
-            float(factors[i] * np.sqrt(np.mean(errors[:, i] ** 2))),
-            float(plan_times[np.argmax(errors[:, i])]),
-            axes.units[i],
-            None if torques is None else float(torques[i]),
-        )
-        for i, joint in enumerate(axes.joints)
+    rows = map(
+        AxisTracking,
+        axes.joints,
+        axes.names,
+        (factors * errors.max(axis=0)).tolist(),
+        (factors * np.sqrt(np.mean(errors**2, axis=0))).tolist(),
+        plan_times[errors.argmax(axis=0)].tolist(),
+        axes.units,
+        torques,
     )
     return Tracking(
-        axes=rows,
+        axes=tuple(rows),
         delay=delay + recording.begin,
         t_end=float(recording.t[-1]),
         t_end_planned=motion.t_end,

@@ -18,7 +18,6 @@ from brachis.apps.controller.profile import (
 from brachis.apps.controller.run import (
     RunReport,
     axes_for,
-    check_period,
     nearest_on_path,
     verify_run,
 )
@@ -31,7 +30,6 @@ __all__ = [
     "RunReport",
     "axes_for",
     "bind_axes",
-    "check_period",
     "load_profile",
     "nearest_on_path",
     "profile_names",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
 import numpy as np
 
-from brachis.apps.controller.profile import Axis, AxisGroup, Profile
+from brachis.apps.controller.profile import Axis, Profile
+from brachis.common.arguments import check_once
 from brachis.errors import InputError, check_names
 from brachis.robot import Robot
 
@@ -87,20 +88,14 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
     UnknownNameError
         An axis names a joint that the robot does not have, or a coupling names an axis that does not exist.
     InputError
-        A joint has two axes, the axes of the arm are not in chain order, or a group has fewer names than axes.
+        A joint or an axis is given twice, the axes of the arm are not in chain order, or a group has too few names.
     """
     names = robot.urdf_joints
     units = dict(zip(names, robot.position_units, strict=False))
     axes = profile.axes or _axes_of_joints(names, units)
     joints = [axis.joint for axis in axes]
     check_names("joint", joints, names, "profile.axes")
-    for joint in joints:
-        if joints.count(joint) > 1:
-            raise InputError(
-                f"joint {joint!r} has two axes",
-                where="profile.axes",
-                allowed="one axis for each joint",
-            )
+    check_once("joint", joints, "profile.axes")
     for number, axis in enumerate(axes):
         if units[axis.joint] == "rad" and abs(axis.zero) > 2.0 * np.pi:
             raise InputError(
@@ -118,11 +113,9 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
             found=", ".join(arm),
             allowed=", ".join(in_order),
         )
-    axis_names = [*_name_axes(axes, profile)]
-    axis_units = [
-        profile_unit(profile.external if axis.external else profile.arm, units[joint])
-        for axis, joint in zip(axes, joints, strict=True)
-    ]
+    named = _name_axes(axes, profile, units)
+    axis_names, axis_units = map(tuple, zip(*named, strict=True))
+    check_once("axis", axis_names, "profile")
     coupling = np.eye(len(axes))
     for name, factors in profile.coupled.items():
         check_names("axis", [name, *factors], axis_names, "profile.coupled")
@@ -138,8 +131,8 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
         axis.sign * FACTORS[unit] for axis, unit in zip(axes, axis_units, strict=True)
     ]
     return ControllerAxes(
-        tuple(axis_names),
-        tuple(axis_units),
+        axis_names,
+        axis_units,
         tuple(axis.external for axis in axes),
         tuple(joints),
         np.array([names.index(joint) for joint in joints]),
@@ -148,39 +141,31 @@ def bind_axes(profile: Profile, robot: Robot) -> ControllerAxes:
     )
 
 
-def profile_unit(group: AxisGroup, unit: str) -> str:
-    """Return the unit that a group uses for axes whose joints have the SI unit ``rad`` or ``m``."""
-    return group.angle if unit == "rad" else group.length
-
-
 def _axes_of_joints(names: Sequence[str], units: dict[str, str]) -> tuple[Axis, ...]:
     """Return an axis for each joint, those of the arm first; linear joints before the first rotary one are external."""
     slides = list(takewhile(lambda name: units[name] == "m", names))
-    arm = [name for name in names if name not in slides]
-    if not arm:
-        return tuple(Axis(joint=name) for name in slides)
-    external = [Axis(joint=name, external=True) for name in slides]
-    return (*(Axis(joint=name) for name in arm), *external)
+    arm = [*names[len(slides) :]] or slides
+    ordered = dict.fromkeys((*arm, *slides))
+    return tuple(Axis(joint=name, external=name not in arm) for name in ordered)
 
 
-def _name_axes(axes: Sequence[Axis], profile: Profile) -> list[str]:
-    """Return the name of each axis: its own, otherwise the next one of its group, otherwise that of its joint."""
+def _name_axes(
+    axes: Sequence[Axis], profile: Profile, units: dict[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the name of each axis (its own, the next one of its group, or that of its joint) and its unit."""
     groups = {False: profile.arm, True: profile.external}
     unused = {kind: iter(group.names) for kind, group in groups.items()}
-    names = []
     for axis in axes:
         group = groups[axis.external]
         default = axis.joint if not group.names else None
         name = axis.name or default or next(unused[axis.external], None)
-        if name is None or name in names:
+        if name is None:
             kind = "external axes" if axis.external else "axes of the arm"
-            problem = f"the profile has too few names for {kind}"
             raise InputError(
-                problem if name is None else "two axes have one name",
+                f"the profile has too few names for {kind}",
                 where="profile",
-                found=name or ", ".join(entry.joint for entry in axes),
-                allowed=", ".join(group.names) if name is None else "one name each",
+                found=", ".join(entry.joint for entry in axes),
+                allowed=", ".join(group.names),
                 hint="Name the axes in a profile of your own; a rail has external: true",
             )
-        names.append(name)
-    return names
+        yield name, group.angle if units[axis.joint] == "rad" else group.length

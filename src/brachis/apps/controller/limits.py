@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from brachis.apps.controller.axes import ControllerAxes
 from brachis.apps.controller.profile import Profile
+from brachis.errors import InputError
 from brachis.robot import Robot
 from brachis.robot.limits import MAGNITUDES
 from brachis.task import LIMIT_KINDS
@@ -29,29 +28,33 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
         if not is_external
     ]
     changes: dict[str, Any] = {}
-    value: Any
+    unscaled = without_scale(robot)
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
-        if LIMIT_KINDS[kind].needs_masses and not robot.has_masses:
+        needs_masses = LIMIT_KINDS[kind].needs_masses and not robot.has_masses
+        if stated in (None, FROM_URDF) or needs_masses:
             continue
-        names = axes.joints if isinstance(stated, Mapping) else arm
-        by_joint = map_by_joint(f"profile.limits.{kind}", stated, names, None)
-        ends = without_scale(robot).limits.both_ways(kind)
-        for joint, value in by_joint.items():
-            if value == FROM_URDF:
-                continue
-            stated_ends = np.array(
-                value if isinstance(value, tuple) else (-value, value)
+        if isinstance(stated, tuple) and len(stated) != len(arm):
+            raise InputError(
+                "wrong number of values",
+                where=f"profile.limits.{kind}",
+                found=len(stated),
+                allowed=f"{len(arm)}, for the arm; limits of external axes need a mapping by joint",
             )
-            lower, upper = ends[:, robot.joint_names.index(joint)]
-            pair = (max(lower, stated_ends[0]), min(upper, stated_ends[1]))
+        names = axes.joints if isinstance(stated, Mapping) else arm
+        lower, upper = unscaled.limits.both_ways(kind)
+        value: Any
+        for joint, value in map_by_joint(
+            f"profile.limits.{kind}", stated, names, None
+        ).items():
+            number = robot.joint_names.index(joint)
+            low, high = value if isinstance(value, tuple) else (-value, value)
+            pair = (max(lower[number], low), min(upper[number], high))
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
     if not changes:
         return robot
-    factors = scale_of(robot)
-    stricter = without_scale(robot).with_limits(**changes)
-    return stricter.with_limits(scale=factors) if factors else stricter
+    return unscaled.with_limits(**changes).with_limits(scale=scale_of(robot))
 
 
 def scale_of(robot: Robot) -> dict[str, float]:

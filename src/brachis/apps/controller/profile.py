@@ -71,6 +71,10 @@ class Language(Model):
     """Suffix of the program file."""
     external_axes: Flag = True
     """Whether positions can include external axes."""
+    duration_step: Positive = 1e-6
+    """Resolution of durations, s."""
+    percent_step: Positive | None = None
+    """Resolution of percent, if joint moves have speeds in percent. Null: they have durations."""
     template: Name
     """Jinja template. Variables: name (of the motion), robot, title, date, t_end (s), is_linear, report.positions,
     report.place (m, rad), report.time (s), axes.names, axes.units, axes.external, velocities (maxima of the axes from

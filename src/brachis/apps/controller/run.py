@@ -7,10 +7,9 @@ do. The tool is also checked on the straight joint lines between samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -18,24 +17,18 @@ import numpy as np
 from brachis.apps.controller.axes import ControllerAxes, bind_axes
 from brachis.apps.controller.limits import robot_with_profile, without_scale
 from brachis.apps.controller.profile import Profile, load_profile
-from brachis.common.arrays import spread
-from brachis.common.summary import Summary
+from brachis.common.arrays import interpolate_columns, spread
 from brachis.errors import InputError
 from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskMap, bind, dynamics
+from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
-from brachis.trajectory import (
-    MotionSource,
-    Samples,
-    Trajectory,
-    join_splines,
-    motion_of,
-)
+from brachis.trajectory import MotionSource, Samples, Trajectory, motion_of
 from brachis.verify import Check, Verification, VerifyOptions
+from brachis.verify.checks import check_joints
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.tool import largest_speeds
-from brachis.verify.mechanics import joint_placements
-from brachis.verify.motion import CheckedMotion, MotionStates
+from brachis.verify.mechanics import joint_placements, real_tool_placements
+from brachis.verify.motion import CheckedMotion
 from brachis.verify.verify import path_errors
 
 _MOVING = 1e-6
@@ -44,17 +37,13 @@ _STILL = 1e-9
 """A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
-_CHORD_STEPS = 4
-"""Number of steps in which the straight joint line between two samples is checked."""
-_SLOWER = (1.001, 1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2)
-"""Factors on the duration to try when a run fails."""
-_SHORTER = (2, 4, 8)
-"""Divisors of the period to try when a run fails."""
+_DIVISORS = (2, 4, 8)
+"""Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
 
-@dataclass(frozen=True, repr=False)
-class RunReport(Summary):
-    """Verification of a motion as a controller will run it.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class RunReport(Verification):
+    """Verification of a motion as a controller will run it: limits of the task and of the profile, path, and both ends.
 
     Attributes
     ----------
@@ -62,8 +51,6 @@ class RunReport(Summary):
         Name of the controller and its interface.
     period : float
         Time between samples, s.
-    verification : Verification
-        Checks of the limits of the task and of the profile, of the path, and of both ends.
     remedies : tuple of str
         Changes, each of which is verified to make the run pass; empty if it passes anyway.
 
@@ -77,29 +64,13 @@ class RunReport(Summary):
 
     controller: str
     period: float
-    verification: Verification
     remedies: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return self.verification.passed
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """Failed checks, in words."""
-        return self.verification.failures
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        data = {**vars(self), "verification": self.verification.to_dict()}
-        return {"passed": self.passed, **data}
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user: every check with its worst value."""
         return {
             "controller": f"{self.controller}, every {1e3 * self.period:g} ms",
-            **self.verification.summary(),
+            **super().summary(),
             "remedies": "; ".join(self.remedies) or "none needed",
         }
 
@@ -147,32 +118,20 @@ def verify_run(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    period = check_period(profile, period)
-    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-    run = _Run(motion, profile, axes, robot, tuple(own_limits))
-    verification = run.verify(period)
-    remedies = () if verification.passed else tuple(_find_remedies(run, period))
-    return RunReport(profile.title, period, verification, remedies)
-
-
-def check_period(profile: Profile, period: float | None) -> float:
-    """Return the period of the samples for a controller, s; by default the period of the profile.
-
-    Raises
-    ------
-    InputError
-        The controller accepts only its own period.
-    """
-    if period is None or period == profile.period:
-        return profile.period
-    if profile.fixed_period:
+    period = profile.period if period is None else period
+    if profile.fixed_period and period != profile.period:
         raise InputError(
             "the controller does not accept this period",
             where="dt",
             found=f"{period:g} s",
             allowed=f"{profile.period:g} s ({profile.title})",
         )
-    return period
+    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
+    run = _Run(motion, profile, axes, robot, tuple(own_limits))
+    report = run.verify(period)
+    if report.passed:
+        return report
+    return replace(report, remedies=tuple(_find_remedies(run, period)))
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
@@ -219,56 +178,58 @@ class _Run:
     robot: Robot
     own_limits: tuple[LimitModel, ...]
 
-    def verify(self, period: float) -> Verification:
+    def verify(self, period: float) -> RunReport:
         """Verify the run with a given period, s."""
-        samples = self.motion.sample(period, last=self.profile.last)
+        profile = self.profile
+        samples = self.motion.sample(period, last=profile.last)
         q = samples.q.copy()
-        if self.profile.decimals is not None:
-            values = np.round(self.axes.encode(q), self.profile.decimals)
+        if profile.decimals is not None:
+            values = np.round(self.axes.encode(q), profile.decimals)
             q[:, self.axes.index] = self.axes.decode(values)
-        run = interpolate(self.motion, samples, q, self.profile.interpolation)
-        task = run.task
+        task = self.motion.task
         robot, task_map = bind(self.robot, task.task_space, task.tolerances)
-        path = path_of(task_map, task)
-        options = VerifyOptions(ratio_tolerance=task.refinement.tolerance)
-        allowed = 1.0 + options.ratio_tolerance
-        differences: list[Check] = []
-        kind = CheckedMotion
-        if self.profile.is_sampled:
-            differences = [
-                *_check_differences(robot, run, allowed),
-                *_check_tool_speed(robot, run, allowed),
-            ]
-            kind = _SampledMotion
-        checked = kind(run, robot, task_map, path, options)
-        replaced = {
-            check.name.replace("by differences", "ratio") for check in differences
-        }
-        limits = check_limits(checked, self.own_limits)
-        ratios = [check for check in limits if check.name not in replaced] + differences
-        path_check = _check_path(checked, self.profile)
-        checks = (path_check, *ratios, *_check_rest(self.motion, self.profile))
+        motion = CheckedMotion(
+            interpolate(self.motion, samples, q, profile.interpolation),
+            robot,
+            task_map,
+            path_of(task_map, task),
+            VerifyOptions(ratio_tolerance=task.refinement.tolerance),
+            is_sampled=profile.is_sampled,
+        )
+        ratios = check_limits(motion, self.own_limits)
+        if profile.is_sampled:
+            differences = list(_check_differences(motion))
+            replaced = {check.limit for check in differences}
+            ratios = [check for check in ratios if check.limit not in replaced]
+            ratios += differences
+        path_check = _check_path(motion, profile)
+        checks = [path_check, *ratios]
+        if profile.rest == "full":
+            plan = self.motion
+            ends = [0, -1]
+            allowed = _REST * max(np.abs(plan.qddot).max(), 1.0)
+            name = "acceleration at the ends"
+            instants = (plan.qddot[ends], plan.times[ends])
+            kind = "acceleration"
+            checks.append(check_joints(motion, name, *instants, kind, allowed))
         worst = max((check.value for check in ratios), default=0.0)
-        return Verification(checks, len(checked.states.t), worst, path_check.value)
-
-
-class _SampledMotion(CheckedMotion):
-    """A motion that is known only at its nodes."""
-
-    @cached_property
-    def states(self) -> MotionStates:
-        """States of the motion at its nodes."""
-        last = len(self.pieces.lengths) - 1
-        index = np.append(np.arange(last + 1), last)
-        u = np.zeros(last + 2)
-        u[-1] = 1.0
-        return MotionStates(self.pieces, index, u)
+        return RunReport(
+            checks=tuple(checks),
+            points=len(motion.states.t),
+            worst_ratio=worst,
+            path_error=path_check.value,
+            controller=profile.title,
+            period=period,
+        )
 
 
 def interpolate(
     motion: Trajectory, samples: Samples, q: np.ndarray, interpolation: str
 ) -> Trajectory:
     """Return the motion between samples.
+
+    For ``hold`` and ``linear``, only the nodes, which are the samples, have a meaning. Their velocities and
+    accelerations are central differences, with rest before the first and after the last sample.
 
     Parameters
     ----------
@@ -283,68 +244,40 @@ def interpolate(
     Returns
     -------
     Trajectory
-        The interpolated motion, with the path coordinate of the plan. It waits at the end until the last sample.
+        The interpolated motion, with the path coordinate of the plan.
     """
     t = samples.t
-    h = np.diff(t)[:, None]
-    slopes = np.diff(q, axis=0) / h
-    qdot = samples.qdot
-    after = samples.qddot
-    before = samples.qddot
-    if interpolation == "cubic":
-        after = np.zeros_like(q)
-        before = np.zeros_like(q)
-        after[:-1] = (6.0 * slopes - 4.0 * qdot[:-1] - 2.0 * qdot[1:]) / h
-        before[1:] = (2.0 * qdot[:-1] + 4.0 * qdot[1:] - 6.0 * slopes) / h
-        after[-1] = before[-1]
-        before[0] = after[0]
-    elif interpolation != "quintic":
-        qdot, after = _central_differences(t, q, samples.qdot[[0, -1]])
-        before = after
-    splines = motion.phase_splines
-    wait = t[-1] - motion.t_end
-    if wait > _STILL:
-        splines = (*splines, splines[-1].wait(wait))
-    knots, control_points = join_splines(splines)
-    ends = np.cumsum([spline.t_end for spline in splines])
-    ends[-1] = t[-1]
-    return replace(
-        motion,
-        times=t,
-        q=q,
-        qdot=qdot,
-        qddot=after,
-        qddot_before=before,
-        knots=knots,
-        control_points=control_points,
-        phase_ends=ends,
-    )
+    nodes: dict[str, Any] = {"times": t, "q": q, "qdot": samples.qdot}
+    if interpolation == "quintic":
+        nodes |= {"qddot": samples.qddot, "qddot_before": samples.qddot}
+    elif interpolation == "cubic":
+        from scipy.interpolate import CubicHermiteSpline
 
-
-def _central_differences(
-    t: np.ndarray, q: np.ndarray, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocities and accelerations, (K, n), at the samples; `ends`, (2, n), are the velocities at both ends."""
-    h = np.diff(t)[:, None]
-    slopes = np.diff(q, axis=0) / h
-    qdot = np.empty_like(q)
-    qdot[1:-1] = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[1:] + h[:-1])
-    qdot[[0, -1]] = ends
-    qddot = np.empty_like(q)
-    qddot[1:-1] = 2.0 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
-    qddot[0] = 2.0 * (slopes[0] - qdot[0]) / h[0]
-    qddot[-1] = 2.0 * (qdot[-1] - slopes[-1]) / h[-1]
-    return qdot, qddot
+        rates, begins = CubicHermiteSpline(t, q, samples.qdot).derivative(2).c
+        ends = begins + rates * np.diff(t)[:, None]
+        nodes["qddot"] = np.concatenate([begins, ends[-1:]])
+        nodes["qddot_before"] = np.concatenate([begins[:1], ends])
+    else:
+        mirrored = np.pad(q, ((1, 1), (0, 0)), mode="reflect")
+        nodes["qdot"] = (mirrored[2:] - mirrored[:-2]) / (2.0 * t[1])
+        qddot = np.diff(mirrored, 2, axis=0) / t[1] ** 2
+        nodes |= {"qddot": qddot, "qddot_before": qddot}
+        # The plan may end before the last sample; its path coordinate is that of the samples, too.
+        knots = np.pad(t / t[-1], 1, mode="edge")
+        nodes |= {"knots": knots, "control_points": samples.s[None]}
+        motion = replace(motion, degree=1, phase_ends=t[-1:])
+    return replace(motion, **nodes)
 
 
 def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
     """Check the distance of the tool from the path, between bare samples along straight joint lines."""
     t = motion.states.t
     q = motion.states.q
-    if isinstance(motion, _SampledMotion):
-        t = spread(motion.trajectory.times, _CHORD_STEPS)
-        nodes = motion.trajectory.times
-        q = np.column_stack([np.interp(t, nodes, joint) for joint in q.T])
+    if motion.is_sampled:
+        # A short line is farthest from the path in its middle.
+        middles = spread(t, 2)
+        q = interpolate_columns(middles, t, q)
+        t = middles
     s = motion.trajectory.path_spline(t).clip(0.0, 1.0)
     # A tool that is early or late on the path has not left the path.
     s = nearest_on_path(motion.path, motion.task_map, motion.task_map.values(q), s)
@@ -371,92 +304,87 @@ def nearest_on_path(
     return s
 
 
-def _check_differences(
-    robot: Robot, run: Trajectory, allowed: float
-) -> Iterator[Check]:
+def _check_differences(motion: CheckedMotion) -> Iterator[Check]:
     """Check the differences of successive samples, divided by the period, as controllers do."""
-    period = run.times[1]
-    quantities = {
-        "velocity": (run.q, 1),
-        "acceleration": (run.q, 2),
-        "jerk": (run.q, 3),
-    }
-    if robot.has_masses:
-        torques = dynamics.torque(robot, run.q, run.qdot, run.qddot)
-        quantities["torque_rate"] = (torques, 1)
-    for kind, (values, order) in quantities.items():
-        lower, upper = robot.limits.both_ways(kind)
-        if not np.isfinite(upper).any():
+    t = motion.states.t
+    for limit, order, ratios, subjects in _list_ratios(motion):
+        if not ratios.any():
             continue
+        row, column = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
+        yield Check(
+            f"{limit} by differences",
+            ratios[row, column],
+            1.0 + motion.options.ratio_tolerance,
+            "-",
+            subjects[column],
+            t[np.clip(row - order + 2, 0, len(t) - 1)],
+            limit=limit,
+        )
+
+
+def _list_ratios(
+    motion: CheckedMotion,
+) -> Iterator[tuple[str, int, np.ndarray, Sequence[str]]]:
+    """Yield limits, orders of differences, their ratios, (K', c), and their c subjects; 0 without a limit."""
+    robot = motion.robot
+    states = motion.states
+    names = robot.joint_names
+    period = states.t[1]
+    derivatives = [("velocity", 1, states.q)]
+    derivatives += [("acceleration", 2, states.q), ("jerk", 3, states.q)]
+    if robot.has_masses:
+        derivatives.append(("torque_rate", 1, states.tau))
+        heat = np.cumsum(states.tau**2, axis=0) / len(states.t)
+        yield "rms torque", 1, np.sqrt(heat) / robot.limits.rms_torque, names
+    for kind, order, values in derivatives:
+        lower, upper = robot.limits.both_ways(kind)
         # The controller holds the first position before the motion, and the last one after it.
         held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
         rates = np.diff(held, order, axis=0) / period**order
         ratios = np.maximum(rates / upper, rates / lower)
-        row, joint = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
-        time = run.times[min(max(row - order + 2, 0), len(run.times) - 1)]
-        name = f"{kind.replace('_', ' ')} by differences"
-        subject = robot.joint_names[joint]
-        ratio = ratios[row, joint]
-        yield Check(name, ratio, allowed, "-", subject, time, of_limit=True)
-    limit = robot.limits.rms_torque
-    if np.isfinite(limit).any():
-        ratios = np.sqrt(np.mean(torques**2, axis=0)) / limit
-        joint = int(np.argmax(ratios))
-        subject = robot.joint_names[joint]
-        name = "rms torque by differences"
-        yield Check(name, ratios[joint], allowed, "-", subject, of_limit=True)
-
-
-def _check_tool_speed(robot: Robot, run: Trajectory, allowed: float) -> Iterator[Check]:
-    """Check the distances between tool positions at successive samples, divided by the period."""
-    s = run.path_coordinate(run.times)
-    largest = largest_speeds(run.task, s, np.maximum)
-    if np.isinf(largest).all():
-        return
-    places, _ = robot.tool_placements(robot.of_real_joints(run.q))
-    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / run.times[1]
-    ratios = speeds / np.maximum(largest[1:], largest[:-1])
-    row = int(np.argmax(ratios))
-    name = "tool speed by differences"
-    time = run.times[row]
-    yield Check(name, ratios[row], allowed, "-", "tool", time, of_limit=True)
-
-
-def _check_rest(motion: Trajectory, profile: Profile) -> Iterator[Check]:
-    """Check that the plan begins and ends as the controller requires."""
-    if profile.rest != "full":
-        return
-    ends = np.abs(motion.qddot[[0, -1]])
-    joint = int(np.argmax(ends.max(axis=0)))
-    allowed = _REST * max(np.abs(motion.qddot).max(), 1.0)
-    yield Check(
-        "acceleration at the ends",
-        ends[:, joint].max(),
-        allowed,
-        "rad/s^2, m/s^2",
-        motion.joint_names[joint],
-    )
+        yield kind.replace("_", " "), order, ratios, names
+    tool, _ = real_tool_placements(robot, *states.joints)
+    steps = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    largest = largest_speeds(motion.task, states.s, np.maximum)
+    allowed = period * np.maximum(largest[1:], largest[:-1])
+    yield "tool speed", 1, (steps / allowed)[:, None], ("tool",)
 
 
 def _find_remedies(run: _Run, period: float) -> Iterator[str]:
-    """Yield changes that let a run pass, each of them verified."""
+    """Yield the smallest changes that let a run pass, each of them verified."""
     profile = run.profile
-    trials: list[list[tuple[str, _Run, float]]] = [[], [], []]
-    for decimals in range(10 if profile.decimals is None else profile.decimals + 1, 10):
-        finer = profile.model_copy(update={"decimals": decimals})
-        text = f"{decimals} decimals"
-        trials[0].append((text, replace(run, profile=finer), period))
-    for divisor in () if profile.fixed_period else _SHORTER:
-        text = f"a period of {1e3 * period / divisor:g} ms"
-        trials[1].append((text, run, period / divisor))
+    decimals = range(10 if profile.decimals is None else profile.decimals + 1, 10)
+    divisors = () if profile.fixed_period else _DIVISORS
+    periods = [1e3 * period / divisor for divisor in divisors]
     has_speeds = run.motion.task.tool_limits.process_speed
-    for factor in () if has_speeds else _SLOWER:
-        slower = replace(run, motion=slow_down(run.motion, factor))
-        trials[2].append((f"{100.0 / factor:.4g} % of the speed", slower, period))
-    for group in trials:
-        passing = (text for text, trial, dt in group if trial.verify(dt).passed)
-        for text in islice(passing, 1):
-            yield f"the motion passes with {text}"
+    speeds = () if has_speeds else [0.1 * number for number in range(999, 499, -1)]
+
+    def passes(changed: _Run, period: float) -> bool:
+        """Return whether a changed run passes."""
+        return changed.verify(period).passed
+
+    changes: tuple[tuple[str, Sequence[float], Callable[[Any], bool]], ...] = (
+        (
+            "{} decimals",
+            decimals,
+            lambda value: passes(
+                replace(run, profile=profile.model_copy(update={"decimals": value})),
+                period,
+            ),
+        ),
+        ("a period of {:g} ms", periods, lambda value: passes(run, 1e-3 * value)),
+        (
+            "{:g} % of the speed",
+            speeds,
+            lambda value: passes(
+                replace(run, motion=slow_down(run.motion, 100.0 / value)), period
+            ),
+        ),
+    )
+    for text, values, has_passed in changes:
+        index = bisect_left(values, 1, key=has_passed)
+        if index < len(values):
+            yield f"the motion passes with {text.format(values[index])}"
     yield "to plan a motion that passes, plan with the profile (--profile)"
 
 

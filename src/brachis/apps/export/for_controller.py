@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -16,13 +15,12 @@ from brachis.apps.controller import (
     Profile,
     RunReport,
     axes_for,
-    check_period,
     load_profile,
     robot_with_profile,
     verify_run,
     without_scale,
 )
-from brachis.apps.export.formats import FORMATS
+from brachis.apps.export.formats import FORMATS, name_format
 from brachis.apps.export.programs import ProgramReport, write_program
 from brachis.apps.export.rows import JointRows
 from brachis.common.files import atomic_write, file_name
@@ -99,17 +97,26 @@ def write_for_controller(
     motion = motion_of(trajectory)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
-    name = _name_format(profile, file_name(path, "path").suffix, form)
+    tables = [known for known, table in FORMATS.items() if table.step is None]
+    check_names("format of samples", profile.formats, tables, "profile.formats")
+    suffixes = {known: FORMATS[known].suffix for known in profile.formats}
+    if profile.program is not None:
+        suffixes[PROGRAM] = profile.program.suffix
+    name = name_format(path, form, suffixes, f"format of {profile.title}")
     if name == PROGRAM:
-        report = _write_program(
+        text, report = write_program(
             motion,
-            path,
             profile,
             axes,
+            file_name(path, "path").stem,
             moves=moves,
             tolerance=tolerance,
             time_tolerance=time_tolerance,
         )
+        first_line = re.escape(text.partition("\n")[0]).encode()
+        beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
+        with atomic_write(path, beginning) as stream:
+            stream.write(text.encode())
         robot = robot_with_profile(without_scale(motion.robot), profile, axes)
         verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
         _warn(profile, verification.failures)
@@ -121,52 +128,12 @@ def write_for_controller(
             found=moves,
             allowed="this option with programs of positions",
         )
-    period = check_period(profile, dt)
-    run = verify_run(motion, profile, period=period, own_limits=own_limits)
-    rows = _rows_of(motion, period, profile, axes)
+    run = verify_run(motion, profile, period=dt, own_limits=own_limits)
+    rows = _rows_of(motion, run.period, profile, axes)
     with atomic_write(path, FORMATS[name].beginning) as stream:
         FORMATS[name].writer(rows, stream)
     _warn(profile, (*run.failures, *run.remedies))
     return run
-
-
-def _name_format(profile: Profile, suffix: str, form: str | None) -> str:
-    """Name the format of a file for a controller: the one that is asked for, or else the first with this suffix."""
-    tables = [name for name, known in FORMATS.items() if known.step is None]
-    check_names("format of samples", profile.formats, tables, "profile.formats")
-    suffixes = {name: FORMATS[name].suffix for name in profile.formats}
-    if profile.program is not None:
-        suffixes[PROGRAM] = profile.program.suffix
-    same = [name for name, known in suffixes.items() if known == suffix]
-    name = form or next(iter(same), suffix)
-    if name not in suffixes:
-        shown = (
-            f"{known} ({known_suffix})" for known, known_suffix in suffixes.items()
-        )
-        raise InputError(
-            "the controller does not accept this format",
-            where="format",
-            found=name or "no suffix",
-            allowed=f"{', '.join(shown)}: {profile.title}",
-        )
-    return name
-
-
-def _write_program(
-    motion: Trajectory,
-    path: str | os.PathLike[str],
-    profile: Profile,
-    axes: ControllerAxes,
-    **options: Any,
-) -> ProgramReport:
-    """Write a program of positions; see `write_program`."""
-    name = file_name(path, "path").stem
-    text, report = write_program(motion, profile, axes, name, **options)
-    first_line = re.escape(text.partition("\n")[0]).encode()
-    beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
-    with atomic_write(path, beginning) as stream:
-        stream.write(text.encode())
-    return report
 
 
 def _warn(profile: Profile, reasons: Sequence[str]) -> None:

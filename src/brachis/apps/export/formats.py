@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -99,8 +99,13 @@ FORMATS: dict[str, Format] = {
 """Export formats by name."""
 
 
-def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
-    """Return the format with a given name, or the format that belongs to the suffix of a file.
+def name_format(
+    path: str | os.PathLike[str],
+    name: str | None,
+    suffixes: Mapping[str, str],
+    kind: str = "format",
+) -> str:
+    """Return the name of a format: the given one, or the first one with the suffix of a file.
 
     Raises
     ------
@@ -110,19 +115,25 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
         The suffix does not belong to a format.
     """
     if name is not None:
-        check_names("format", [name], FORMATS, "format")
-        return FORMATS[name]
+        check_names(kind, [name], suffixes, "format")
+        return name
     suffix = file_name(path, "path").suffix.lower()
-    formats = [form for form in FORMATS.values() if form.suffix == suffix]
-    if not formats:
-        raise InputError(
-            "the suffix of the file is not that of a known format",
-            where=str(path),
-            found=f"suffix {suffix}" if suffix else "no suffix",
-            allowed=", ".join(form.suffix for form in FORMATS.values()),
-            hint=f"Or name the format: {', '.join(FORMATS)}; programs of controllers need a profile",
-        )
-    return formats[0]
+    for known, known_suffix in suffixes.items():
+        if known_suffix == suffix:
+            return known
+    raise InputError(
+        f"the suffix of the file is not that of a known {kind}",
+        where=str(path),
+        found=f"suffix {suffix}" if suffix else "no suffix",
+        allowed=", ".join(suffixes.values()),
+        hint=f"Or name the format: {', '.join(suffixes)}; programs of controllers need a profile",
+    )
+
+
+def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
+    """Return the format with a given name, or the format that belongs to the suffix of a file; see `name_format`."""
+    suffixes = {known: form.suffix for known, form in FORMATS.items()}
+    return FORMATS[name_format(path, name, suffixes)]
 
 
 def write(

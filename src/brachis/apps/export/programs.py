@@ -9,6 +9,7 @@ speeds up or slows down over `BLEND` times the time of the line.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller import ControllerAxes, Profile, nearest_on_path
+from brachis.apps.controller import ControllerAxes, Language, Profile, nearest_on_path
 from brachis.apps.export.rows import require_library
+from brachis.common.arrays import apply_each
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.path import path_of
@@ -28,14 +30,17 @@ from brachis.trajectory import Trajectory
 BLEND = 0.25
 """Half of the duration of the parabola at a corner, as a fraction of the shorter neighbouring time."""
 _POINTS = 1000
-"""Number of times at which the motion is compared with the program."""
+"""Number of times at which the motion is compared with the program.
+
+The deviations of programs of the tests' seams are found to within 1 %, and with a quarter of the times to within 5 %.
+"""
+_MOST = _POINTS // 2
+"""Maximum number of positions in a program, so that lines are compared inside too."""
 _STRICTER = 0.7
-"""Factor by which the tolerances of single lines are reduced if rounded corners exceed the tolerances."""
-_ROUNDS = 12
-_FARTHER = 8
-"""Maximum ratio of the duration of a line to that of the previous line."""
-_MOST = 500
-"""Maximum number of positions in a program."""
+"""Factor by which the tolerances of single lines are reduced if the whole program exceeds the tolerances.
+
+Deviations grow as the squares of lengths, so that no more than a fifth of the positions is unnecessary.
+"""
 _LINE_STEPS = 20
 """Number of steps in which the arm is followed along a line of the tool."""
 _NEWTON_STEPS = 4
@@ -44,6 +49,8 @@ _SAME_POSTURE = 1e-3
 """Maximum difference between the joints of two postures that count as the same, rad."""
 _REST = 1e-6
 """Joint velocity below which the arm counts as at rest, rad/s or m/s."""
+_ARM_JOINTS = 6
+"""Number of joints with which a controller's inverse kinematics of the arm has a finite number of solutions."""
 _SLOW = 1e-3
 """Path velocity, as a fraction of the mean path velocity, below which times are not compared."""
 
@@ -129,18 +136,11 @@ def write_program(
             found=", ".join(axes.names),
             allowed="only the joints of the arm",
         )
-    events = dict(_events(motion, profile))
-    follower = _Follower(motion, is_linear=moves == "linear")
-    if follower.is_linear:
-        follower.check_arm(axes)
+    follower = _Follower(motion, axes, language, is_linear=moves == "linear")
     nodes, place, time = follower.choose_within(tolerance, time_tolerance)
-    if follower.is_linear:
-        follower.check_postures(nodes, axes)
     report = ProgramReport(len(nodes), place, time)
-    largest = _largest_velocities(motion.robot)
-    if "percent" in language.template and not follower.is_linear:
-        _check_velocities(largest, axes)
-    columns = follower.describe(nodes, axes, largest)
+    columns = follower.describe(nodes)
+    events = dict(_events(motion, profile))
     steps = [
         {name: column[row].tolist() for name, column in columns.items()}
         | {"event": events.get(time, "")}
@@ -155,7 +155,7 @@ def write_program(
         "t_end": motion.t_end,
         "is_linear": follower.is_linear,
         "axes": axes,
-        "velocities": np.abs(axes.encode_rates(largest[None])[0]).tolist(),
+        "velocities": np.abs(axes.encode_rates(follower.velocities[None])[0]).tolist(),
         "steps": steps,
     }
     return _render(language.template, fields), report
@@ -183,28 +183,10 @@ def _render(template: str, fields: dict[str, Any]) -> str:
     return text
 
 
-def _check_velocities(largest: np.ndarray, axes: ControllerAxes) -> None:
-    """Refuse speeds in percent of velocities that are not known."""
-    unknown = [
-        joint
-        for joint, number in zip(axes.joints, axes.index, strict=True)
-        if np.isinf(largest[number])
-    ]
-    if unknown:
-        raise InputError(
-            "speeds in percent need the machine's largest velocities",
-            where="robot.limits.velocity",
-            found=f"none for {', '.join(unknown)}",
-        )
-
-
 def _largest_velocities(robot: Robot) -> np.ndarray:
     """Return the machine's largest velocities, (n,): those of the URDF, or else of the task; infinite where unknown."""
-    largest = robot.limits.velocity.copy()
-    for number, limit in enumerate(robot.urdf_limits):
-        if limit.velocity:
-            largest[number] = limit.velocity
-    return largest
+    stated = zip(robot.urdf_limits, robot.limits.velocity, strict=False)
+    return np.array([limit.velocity or velocity for limit, velocity in stated])
 
 
 class _Follower:
@@ -212,15 +194,31 @@ class _Follower:
 
     Attributes
     ----------
-    t : (K,) ndarray
-        Times of the comparison, s.
+    t, s : (K,) ndarray
+        Times of the comparison, s, and path coordinates.
+    q : (K, n) ndarray
+    followed : (K, c) ndarray
+        What moves on straight lines: `q` or, for linear moves, the task coordinates.
+    velocities : (n,) ndarray
+        The machine's largest velocities, infinite where unknown.
     """
 
-    def __init__(self, motion: Trajectory, *, is_linear: bool) -> None:
+    def __init__(
+        self,
+        motion: Trajectory,
+        axes: ControllerAxes,
+        language: Language,
+        *,
+        is_linear: bool,
+    ) -> None:
         task = motion.task
         _, self.task_map = bind(motion.robot, task.task_space, task.tolerances)
         self.path = path_of(self.task_map, task)
         self.motion = motion
+        self.axes = axes
+        self.duration_step = language.duration_step
+        self.percent_step = None if is_linear else language.percent_step
+        self.velocities = _largest_velocities(motion.robot)
         self.is_linear = is_linear
         even = np.linspace(0.0, motion.t_end, _POINTS)
         self.t = np.union1d(even, motion.phase_ends)
@@ -228,148 +226,173 @@ class _Follower:
         self.s = motion.path_coordinate(self.t)
         self.followed = self.task_map.values(self.q) if is_linear else self.q
         self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
+        arm_joints = axes.external.count(False)
+        if is_linear and not (task.of_poses and arm_joints == _ARM_JOINTS):
+            raise InputError(
+                "linear moves need a path of poses, and an arm of six joints",
+                where="moves",
+                found=f"task_space: {task.task_space}, {arm_joints} joints",
+                allowed="joint",
+            )
+        unknown = np.array(axes.joints)[np.isinf(self.velocities[axes.index])]
+        if self.percent_step and len(unknown):
+            raise InputError(
+                "speeds in percent need the machine's largest velocities",
+                where="robot.limits.velocity",
+                found=f"none for {', '.join(unknown)}",
+            )
 
     def choose_within(
         self, tolerance: float, time_tolerance: float
     ) -> tuple[np.ndarray, float, float]:
-        """Choose positions whose rounded corners are within the tolerances too; return the deviations with them.
+        """Choose positions, (N,) indices of times, whose rounded corners and durations are within the tolerances too.
+
+        Their deviations are returned too.
 
         Raises
         ------
         InputError
-            They would be too many.
+            They would be too many, or lines of the tool would end in other postures.
         """
         share = 1.0
-        for _ in range(_ROUNDS):
+        while True:
             nodes = self.choose(share * tolerance, share * time_tolerance)
-            place, time = self.deviate(nodes, self.t)
-            if place <= tolerance and time <= time_tolerance and len(nodes) <= _MOST:
-                return nodes, place, time
+            place, time = self.deviate(nodes, self.describe(nodes)["duration"])
             if len(nodes) > _MOST:
-                break
+                raise InputError(
+                    "no program of positions is within the tolerance",
+                    where="tolerance",
+                    found=f"{place:.3g} m, rad and {time:.3g} s with {_MOST} positions, rounded for the language",
+                    allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
+                )
+            if place <= tolerance and time <= time_tolerance:
+                if self.is_linear:
+                    self.check_postures(nodes)
+                return nodes, place, time
             share *= _STRICTER
-        raise InputError(
-            "no program of positions is within the tolerance",
-            where="tolerance",
-            found=f"more than {tolerance:g} m, rad or {time_tolerance:g} s with {len(nodes) - 1} positions",
-            allowed=f"up to {_MOST} positions",
-        )
 
     def choose(self, tolerance: float, time_tolerance: float) -> np.ndarray:
-        """Choose the positions, (N,) indices of times, with lines as long as the tolerances allow."""
+        """Choose the positions with lines as long as the tolerances allow, by bisection."""
 
-        def fits(first: int, last: int) -> bool:
-            """Return whether the line between two times is within the tolerances."""
-            nodes = np.array([first, last])
-            place, time = self.deviate(nodes, self.t[first : last + 1])
-            return place <= tolerance and time <= time_tolerance
+        def exceeds(last: int) -> bool:
+            """Return whether the line from the latest position exceeds the tolerances."""
+            place, time = self.deviate(np.array([nodes[-1], last]))
+            return place > tolerance or time > time_tolerance
 
         nodes = [0]
         for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
             while nodes[-1] < end and len(nodes) <= _MOST:
-                first = nodes[-1]
-                # A longer line may fit where a shorter one does not, so the search begins far away.
-                before = first - nodes[-2] if first else end
-                high = min(end, first + _FARTHER * before)
-                low = high
-                while low > first + 1 and not fits(first, low):
-                    high = low
-                    low = first + max(1, 4 * (low - first) // 5)
-                while low < high - 1:
-                    middle = (low + high) // 2
-                    low, high = (middle, high) if fits(first, middle) else (low, middle)
-                nodes.append(low)
+                following = range(nodes[-1] + 2, end + 1)
+                count = bisect_left(following, 1, key=exceeds)
+                nodes.append(nodes[-1] + 1 + count)
         return np.array(nodes)
 
-    def deviate(self, nodes: np.ndarray, t: np.ndarray) -> tuple[float, float]:
-        """Return the largest deviations from the path, m or rad, and from the motion's timing, s, at times (k,)."""
-        rests = self.rests[nodes]
-        values = nominal(self.t[nodes], self.followed[nodes], rests, t)
+    def deviate(
+        self, nodes: np.ndarray, durations: np.ndarray | None = None
+    ) -> tuple[float, float]:
+        """Return the largest deviations from the path, m or rad, and from the motion's timing, s, between positions.
+
+        `durations`, (N,), s, are those of the lines that end at the positions, by default as in the motion.
+        """
+        rows = slice(nodes[0], nodes[-1] + 1)
+        planned = self.t[nodes]
+        times = planned if durations is None else np.cumsum(durations)
+        t = np.interp(self.t[rows], planned, times)
+        values = nominal(times, self.followed[nodes], self.rests[nodes], t)
         if not self.is_linear:
             values = self.task_map.values(values)
-        planned = self.motion.path_coordinate(t)
-        s = nearest_on_path(self.path, self.task_map, values, planned)
+        s = nearest_on_path(self.path, self.task_map, values, self.s[rows])
         miss = self.task_map.difference(values, self.path.sample(s).target)
-        moves = np.append(True, np.diff(self.s) > 0.0)
-        late = np.abs(np.interp(s, self.s[moves], self.t[moves]) - t)
-        fast = self.motion.path_spline(t, nu=1) > _SLOW / self.motion.t_end
-        return float(np.max(self.task_map.norms(miss))), late[fast].max(initial=0.0)
+        # A point where the motion dwells is passed from the first to the last of its times.
+        moves = np.diff(self.s) > 0.0
+        first = np.append(True, moves)
+        last = np.append(moves, True)
+        early = np.interp(s, self.s[first], self.t[first]) - t
+        late = t - np.interp(s, self.s[last], self.t[last])
+        motion = self.motion
+        fast = motion.path_spline(self.t[rows], nu=1) > _SLOW / motion.t_end
+        time = np.maximum(early, late)[fast].max(initial=0.0)
+        return float(np.max(self.task_map.norms(miss))), float(time)
 
-    def check_arm(self, axes: ControllerAxes) -> None:
-        """Refuse lines of the tool where the controller's inverse kinematics would not be that of six joints."""
-        count = axes.external.count(False)
-        if not self.motion.task.of_poses or count != 6:
-            raise InputError(
-                "linear moves need a path of poses, and an arm of six joints",
-                where="moves",
-                found=f"task_space: {self.motion.task.task_space}, {count} joints",
-                allowed="joint",
-            )
-
-    def check_postures(self, nodes: np.ndarray, axes: ControllerAxes) -> None:
+    def check_postures(self, nodes: np.ndarray) -> None:
         """Refuse lines of the tool along which an arm would come to other postures than those of the plan.
 
         The external axes move on straight lines, and the arm's joints follow the tool by Newton's method.
         """
-        arm = axes.index[~np.array(axes.external)]
-        for first, last in pairwise(nodes.tolist()):
-            before = self.q[first]
-            after = self.q[last]
-            q = before.copy()
-            for u in np.linspace(0.0, 1.0, _LINE_STEPS + 1)[1:]:
-                target = (1.0 - u) * self.followed[first] + u * self.followed[last]
-                line = (1.0 - u) * before + u * after
-                line[arm] = q[arm]
-                q = line
-                for _ in range(_NEWTON_STEPS):
-                    values = self.task_map.values(q[None])
-                    miss = self.task_map.difference(target[None], values)[0]
-                    slopes = self.task_map.jacobian(self.task_map.twists(q[None]))[0]
-                    q[arm] += np.linalg.lstsq(slopes[:, arm], miss, rcond=None)[0]
-            off = np.abs(q - after)
-            if off.max() > _SAME_POSTURE:
-                joint = self.motion.joint_names[int(np.argmax(off))]
-                raise InputError(
-                    "on a line of the tool the arm would come to another posture than the plan's",
-                    where="moves",
-                    found=f"{joint} off by {off.max():.3g} rad after {self.t[last]:.4g} s",
-                    allowed="joint, or a plan whose arm does not pass a singular posture",
-                )
+        arm = self.axes.index[~np.array(self.axes.external)]
+        before = self.q[nodes[:-1]]
+        after = self.q[nodes[1:]]
+        begin = self.followed[nodes[:-1]]
+        end = self.followed[nodes[1:]]
+        q = before
+        for u in np.linspace(0.0, 1.0, _LINE_STEPS + 1)[1:]:
+            line = (1.0 - u) * before + u * after
+            line[:, arm] = q[:, arm]
+            q = line
+            target = (1.0 - u) * begin + u * end
+            for _ in range(_NEWTON_STEPS):
+                miss = self.task_map.difference(target, self.task_map.values(q))
+                slopes = self.task_map.jacobian(self.task_map.twists(q))
+                inverse = np.linalg.pinv(slopes[:, :, arm])
+                q[:, arm] += apply_each(inverse, miss)
+        off = np.abs(q - after)
+        row, joint = map(int, np.unravel_index(np.argmax(off), off.shape))
+        if off[row, joint] > _SAME_POSTURE:
+            raise InputError(
+                "on a line of the tool the arm would come to another posture than the plan's",
+                where="moves",
+                found=f"{self.motion.joint_names[joint]} off by {off[row, joint]:.3g} rad "
+                f"after {self.t[nodes[row + 1]]:.4g} s",
+                allowed="joint, or a plan whose arm does not pass a singular posture",
+            )
 
-    def describe(
-        self, nodes: np.ndarray, axes: ControllerAxes, largest: np.ndarray
-    ) -> dict[str, Any]:
-        """Return what a template may say of each position; see `Language`."""
+    def describe(self, nodes: np.ndarray) -> dict[str, np.ndarray]:
+        """Return what a template may say of each position; see `Language`.
+
+        Durations, and speeds in percent, are rounded as the language requires.
+        """
+        index = self.axes.index
         robot = self.motion.robot
         q = self.q[nodes]
         rests = self.rests[nodes]
         h = np.diff(self.t[nodes])
-        constant = h * (1.0 - 0.5 * BLEND * (rests[:-1].astype(float) + rests[1:]))
+        constant = _constant_times(h, rests)
         tool, _ = robot.tool_placements(robot.of_real_joints(q))
         distance = np.linalg.norm(np.diff(tool, axis=0), axis=1)
-        rates = np.abs(np.diff(q, axis=0))[:, axes.index] / constant[:, None]
-        percent = 100.0 * np.max(rates / largest[axes.index], axis=1)
-        waits = np.append(False, np.abs(np.diff(q, axis=0)).max(axis=1) < _REST)
-        zone = (
-            BLEND
-            * np.minimum(np.append(0.0, distance), np.append(distance, 0.0))
-            * ~rests
-        )
+        travel = np.abs(np.diff(q, axis=0))
+        waits = travel.max(axis=1) < _REST
+        rates = travel[:, index] / constant[:, None]
+        percent = 100.0 * np.max(rates / self.velocities[index], axis=1)
+        step = self.percent_step
+        if step:
+            exact = percent
+            percent = (np.round(exact / step) * step).clip(step, 100.0)
+            h *= np.where(waits, 1.0, exact / percent)
+        step = self.duration_step
+        duration = np.append(0.0, (np.round(h / step) * step).clip(step))
+        shorter = np.minimum(np.append(0.0, distance), np.append(distance, 0.0))
         return {
-            "values": np.round(axes.encode(q), 9) + 0.0,
-            "duration": np.append(0.0, h),
+            "values": np.round(self.axes.encode(q), 9) + 0.0,
+            "duration": duration,
             "speed": np.append(0.0, distance / constant),
-            "percent": np.append(1.0, percent.clip(1e-3, 100.0)),
-            "zone": zone,
+            "percent": np.append(1.0, percent),
+            "zone": BLEND * shorter * ~rests,
             "passes": ~rests,
-            "wait": np.where(waits, np.append(0.0, h), 0.0),
+            "wait": np.append(False, waits) * duration,
         }
+
+
+def _constant_times(h: np.ndarray, rests: np.ndarray) -> np.ndarray:
+    """Return the times in which lines of durations h, (N - 1,), s, would be passed at their constant speeds."""
+    return h * (1.0 - 0.5 * BLEND * (rests[:-1].astype(float) + rests[1:]))
 
 
 def nominal(
     times: np.ndarray, nodes: np.ndarray, rests: np.ndarray, t: np.ndarray
 ) -> np.ndarray:
     """Return the nominal motion through nodes, (N, c), at times t, (k,); see the docstring of the module.
+
+    The velocity is linear between the ends of lines at constant speed.
 
     Parameters
     ----------
@@ -381,28 +404,26 @@ def nominal(
     t : (k,) ndarray
         s.
     """
+    from scipy.interpolate import make_interp_spline
+
     h = np.diff(times)
+    velocity = np.diff(nodes, axis=0) / _constant_times(h, rests)[:, None]
     before = np.append(0.0, h)
     after = np.append(h, 0.0)
-    # A line from rest starts later by half of the time in which it speeds up.
-    early = 0.5 * BLEND * before * rests
-    late = 0.5 * BLEND * after * rests
-    corners = np.stack([times - early, times + late], axis=1).ravel()
-    points = np.repeat(nodes, 2, axis=0)
-    passing = BLEND * np.minimum(before, after) * ~rests
-    half = np.stack([early + passing, late], axis=1).ravel()
-    values = np.column_stack([np.interp(t, corners, column) for column in points.T])
-    slopes = np.diff(nodes, axis=0) / np.diff(corners)[1::2, None]
-    still = np.zeros_like(nodes[:1])
-    incoming = np.concatenate([still, slopes])
-    outgoing = np.concatenate([slopes, still])
-    stopped = rests[:, None]
-    turns = [outgoing * ~stopped - incoming, outgoing * stopped]
-    turn = np.stack(turns, axis=1).reshape(points.shape)
-    near = half > 0.0
-    away = np.abs(t[:, None] - corners[near])
-    bow = np.clip(half[near] - away, 0.0, None) ** 2 / (4.0 * half[near])
-    return np.asarray(values + bow @ turn[near])
+    shorter = np.minimum(before, after)
+    # At a rest, its own velocity comes first and counts.
+    ends = np.concatenate(
+        [
+            times[rests],
+            times - BLEND * np.where(rests, before, shorter),
+            times + BLEND * np.where(rests, after, shorter),
+        ]
+    )
+    still = np.zeros_like(nodes[rests])
+    rates = np.concatenate([still, velocity[:1], velocity, velocity, velocity[-1:]])
+    ends, first = np.unique(ends, return_index=True)
+    distance = make_interp_spline(ends, rates[first], 1).antiderivative()
+    return np.asarray(nodes[0] + distance(t))
 
 
 def _events(motion: Trajectory, profile: Profile) -> Iterator[tuple[float, str]]:

@@ -11,9 +11,9 @@ from types import ModuleType
 import numpy as np
 
 from brachis.apps.controller import FACTORS
+from brachis.common.arguments import check_once
 from brachis.errors import (
     BrachisWarning,
-    InputError,
     NotInstalledError,
     check_names,
 )
@@ -116,13 +116,7 @@ def rows_of(
     real = names[: len(trajectory.robot.urdf_joints)]
     chosen = list(real if joints is None else joints)
     check_names("joint", chosen, names, "joints")
-    for name in chosen:
-        if chosen.count(name) > 1:
-            raise InputError(
-                f"joint {name!r} is given twice",
-                where="joints",
-                allowed="each joint once",
-            )
+    check_once("joint", chosen, "joints")
     index = [names.index(name) for name in chosen]
     samples = trajectory.sample(dt, last=last)
     left_out = []

@@ -53,8 +53,8 @@ def check_limits(
             worst.subject,
             worst.time,
             worst.remark,
-            of_limit=True,
-            is_kept=worst.is_kept,
+            name,
+            worst.is_kept,
         )
         for name, worst in results
         if worst is not None
