@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
 import numpy as np
+import yaml
 
 from brachis.common.arguments import count
 from brachis.common.progress import Listener, report_progress
@@ -53,6 +54,8 @@ _DESCENTS = 2
 """Number of places from which steps are taken."""
 _FIRST_RADIUS = 0.25
 """Length of the first step, as a fraction of the ranges."""
+_LONGEST_RADIUS = 0.5
+"""Length of the longest step, as a fraction of the ranges."""
 _SHORTEST_RADIUS = 0.01
 """Length below which no step is taken, as a fraction of the ranges."""
 _SHORTER = 0.4
@@ -90,6 +93,8 @@ class Placing(Summary):
         Name of the frame, or ``base``.
     change : dict of str to float
         How the placement changed, m and degrees, along and about the axes of the world.
+    task : Task
+        The changed task.
     before, after : Result
         Plans of the task as it was, and of the changed task.
     trials : tuple of Trial
@@ -98,14 +103,10 @@ class Placing(Summary):
 
     moved: str
     change: dict[str, float]
+    task: Task
     before: Result
     after: Result
     trials: tuple[Trial, ...]
-
-    @property
-    def task(self) -> Task:
-        """The changed task."""
-        return self.after.task
 
     @property
     def gain(self) -> float:
@@ -140,6 +141,12 @@ class Placing(Summary):
         }
 
 
+def write_task(task: Task) -> str:
+    """Write a task as YAML, without the keys that have their defaults."""
+    content = task.model_dump(mode="json", exclude_defaults=True)
+    return yaml.safe_dump({"brachis": task.brachis, **content}, sort_keys=False)
+
+
 def write_change(change: Mapping[str, float]) -> str:
     """Write a change of a placement with units; coordinates that stay are left out."""
     return ", ".join(
@@ -147,6 +154,26 @@ def write_change(change: Mapping[str, float]) -> str:
         for name, value in change.items()
         if value
     )
+
+
+def read_range(text: str) -> tuple[str, tuple[float, float]]:
+    """Read a range such as ``x=-0.2,0.2``.
+
+    Raises
+    ------
+    InputError
+    """
+    name, _, ends = text.partition("=")
+    try:
+        low, high = map(float, ends.split(","))
+    except ValueError:
+        raise InputError(
+            "this is not a range",
+            where="--range",
+            found=text,
+            allowed="NAME=FROM,TO, such as x=-0.2,0.2",
+        ) from None
+    return name, (low, high)
 
 
 def place(
@@ -214,10 +241,10 @@ def place(
     _check_ranges(ranges)
     with report_progress(listener, progress) as report:
         robot, loaded = read_arguments(robot_or_task, task, keywords)
-        report("planning the task as it is")
-        before = plan(robot, loaded, listener=listener, progress=False)
         problem = bind_task(robot, loaded)
         search = _Search.of(problem, loaded, move, ranges, report)
+        report("planning the task as it is")
+        before = plan(robot, loaded, listener=listener, progress=False)
         start_places = [search.present]
         if starts > 1:
             from scipy.stats import qmc
@@ -235,7 +262,12 @@ def place(
             report("planning the task at the best place")
             after = _faster(after, search.plan_at(robot, place_found, is_final=True))
     return Placing(
-        search.moved, search.change_at(place_found), before, after, tuple(search.trials)
+        moved=search.moved,
+        change=search.change_at(place_found),
+        task=search.task_at(place_found),
+        before=before,
+        after=after,
+        trials=tuple(search.trials),
     )
 
 
@@ -481,7 +513,7 @@ class _Search:
                 radius *= _SHORTER
                 continue
             if gain > _GOOD * predicted:
-                radius *= _LONGER
+                radius = min(radius * _LONGER, _LONGEST_RADIUS)
             u = trial_place
             result = trial
             gradient = self.gradient(result)

@@ -97,12 +97,12 @@ class Gradient:
     Attributes
     ----------
     subject : str
-        What is moved or made heavier: the name of a frame, ``path`` for paths in the world, ``base`` or ``payload``.
+        What is changed: the name of a frame, ``path`` for paths in the world, ``base``, ``payload``, or ``tool``.
     figure : str
         ``x``, ``y`` and ``z`` along the axes of the world; ``roll``, ``pitch`` and ``yaw`` about them, through the
-        origin of the frame, of the base, or the beginning of the path; or ``mass``.
+        origin of the frame, of the base, or the beginning of the path; ``mass``; or a process speed.
     unit : str
-        ``m``, ``rad`` or ``kg``.
+        ``m``, ``rad``, ``kg`` or ``m/s``.
     derivative : float or None
         Derivative of the end time t_E, s per unit; None if there is none.
     note : str
@@ -114,6 +114,14 @@ class Gradient:
     unit: str
     derivative: float | None
     note: str = ""
+
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """The row of a table: what changes, in which way, and the derivative with its unit, or why there is none."""
+        if self.derivative is None:
+            return self.subject, self.figure, self.note
+        per = "s/(m/s)" if self.unit == "m/s" else f"s/{self.unit}"
+        return self.subject, self.figure, f"{self.derivative:+.4g} {per}"
 
 
 @dataclass(frozen=True)

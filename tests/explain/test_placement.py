@@ -1,0 +1,131 @@
+"""Gradients by placements and payload: of planning again, of symmetry, and where there is none."""
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.explain.placement import COORDINATES
+
+LINE = {
+    "brachis": 1,
+    "robot": {"urdf": "scara3"},
+    "start": "free",
+    "path_start": [0.0, 0.0],
+    "task_space": ["x", "y"],
+    "frames": {"part": {"xyz": [1.2, -0.3, 0.0], "rpy_deg": [0.0, 0.0, 10.0]}},
+    "path": {"frame": "part", "segments": [{"line": {"by": [0.3, 0.6]}}]},
+    "spline": {"intervals": 24},
+    "search": {"least_motion": False},
+    "refinement": {"tolerance": 1e-5},
+}
+STEP = 0.003
+
+
+def with_frame(task, xyz, yaw=10.0):
+    return {**task, "frames": {"part": {"xyz": xyz, "rpy_deg": [0.0, 0.0, yaw]}}}
+
+
+@pytest.fixture(scope="module")
+def line():
+    return brachis.plan(LINE)
+
+
+def derivative(result, subject, figure):
+    entries = {
+        (entry.subject, entry.figure): entry.derivative
+        for entry in result.sensitivities.gradients
+    }
+    return entries[subject, figure]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_moved_workpiece_costs_what_its_gradient_says(line, axis):
+    times = []
+    for side in (1.0, -1.0):
+        xyz = [1.2, -0.3, 0.0]
+        xyz[axis] += side * STEP
+        times.append(brachis.plan(with_frame(LINE, xyz), start_from=line).t_end)
+    found = (times[0] - times[1]) / (2.0 * STEP)
+    assert abs(found) > 0.05
+    assert derivative(line, "part", "xy"[axis]) == pytest.approx(found, rel=0.05)
+
+
+def test_a_turned_workpiece_costs_what_its_gradient_says(line):
+    xyz = [1.2, -0.3, 0.0]
+    times = [
+        brachis.plan(with_frame(LINE, xyz, 10.0 + turn), start_from=line).t_end
+        for turn in (0.2, -0.2)
+    ]
+    found = (times[0] - times[1]) / np.radians(0.4)
+    assert derivative(line, "part", "yaw") == pytest.approx(found, rel=0.05)
+
+
+def test_a_heavier_payload_costs_what_its_gradient_says(line):
+    times = [
+        brachis.plan(LINE, robot={"payload": {"mass": mass}}, start_from=line).t_end
+        for mass in (0.06, 0.02)
+    ]
+    found = (times[0] - times[1]) / 0.04
+    assert derivative(line, "payload", "mass") == pytest.approx(found, rel=0.1)
+    assert found > 0.0
+
+
+def test_the_base_moves_against_the_workpiece(line):
+    """A turn about the vertical first axis changes nothing, because that joint has no end here."""
+    for axis in "xy":
+        moved = derivative(line, "part", axis)
+        assert derivative(line, "base", axis) == pytest.approx(-moved, rel=1e-6)
+    assert derivative(line, "base", "yaw") == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_turn_out_of_the_plane_has_no_gradient(line):
+    figures = {
+        entry.figure
+        for entry in line.sensitivities.gradients
+        if entry.subject == "part"
+    }
+    assert figures == set(COORDINATES) - {"roll", "pitch"}
+
+
+def test_a_given_start_posture_holds_the_path():
+    result = brachis.plan(brachis.examples.scara_line, effort="single", strict=False)
+    entries = {entry.subject: entry for entry in result.sensitivities.gradients}
+    assert entries["path"].derivative is None
+    assert "given posture" in entries["path"].note
+    assert entries["payload"].derivative > 0.0
+
+
+def test_gradients_are_saved_with_the_motion(line, tmp_path):
+    line.save(tmp_path / "result.npz")
+    saved = brachis.Trajectory.load(tmp_path / "result.npz")
+    assert saved.sensitivities.gradients == line.sensitivities.gradients
+    assert "Where it stands" in brachis.report.make_report(saved).html
+
+
+def test_a_moved_post_costs_what_its_gradient_says():
+    """The elbow goes round the post; the path stays where it is."""
+    post = {"capsule": {"radius": 0.05, "length": 0.2}, "frame": "post"}
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": "iiwa14"},
+        "start": {"joints": [-0.4, 0.7, 0.0, -1.2, 0.0, 1.0, 0.0]},
+        "task_space": "pose",
+        "path": [{"line": {"by": [0.0, 0.5, 0.0]}}],
+        "scene": [post],
+        "frames": {"post": {"xyz": [0.35, 0.1, 0.65]}},
+        "spline": {"intervals": 16},
+        "search": {"least_motion": False},
+        "refinement": {"tolerance": 1e-5},
+    }
+    result = brachis.plan(task)
+    by_post = [derivative(result, "post", axis) for axis in "xyz"]
+    axis = int(np.argmax(np.abs(by_post)))
+    times = []
+    for side in (1.0, -1.0):
+        xyz = [0.35, 0.1, 0.65]
+        xyz[axis] += side * STEP
+        moved = {**task, "frames": {"post": {"xyz": xyz}}}
+        times.append(brachis.plan(moved, start_from=result).t_end)
+    found = (times[0] - times[1]) / (2.0 * STEP)
+    assert abs(found) > 0.01
+    assert by_post[axis] == pytest.approx(found, rel=0.05)
