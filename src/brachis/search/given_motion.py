@@ -161,7 +161,8 @@ def _given_chain_guess(
         replace(guess, solver=solvers_for(problem.task.solver.name)[0].name)
         for guess in guesses
     ]
-    return ChainGuess.of_parts(problem, guesses, motion.t_end)
+    guess = ChainGuess.of_parts(problem, guesses, motion.t_end)
+    return replace(guess, origin=origin)
 
 
 def without_tolerances(task: Task) -> Task:
