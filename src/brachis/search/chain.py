@@ -25,7 +25,6 @@ from brachis.search.lattice import step_lengths
 from brachis.search.moves import move_guesses
 from brachis.search.order import find_orders
 from brachis.search.schedule import Batch, batches, has_charts
-from brachis.search.screening import screen
 from brachis.search.stages import ChainGuess, InitialGuess
 
 _SHARE = 0.4
@@ -34,8 +33,14 @@ _NODES = 8
 """Number of joint paths of each path among which the best order is sought."""
 _TRIED = 6
 """Number of chains after which none is passable."""
-_SCREENED = 3
-"""Number of chains that are improved for each one that is kept."""
+_KEPT = 24
+"""Number of chains that are kept at each joint path."""
+_PATHS = 3
+"""Number of paths up to which as many chains are improved as joint paths of a single path."""
+_APART = 0.5
+"""Distance between the ends of two joint paths, rad or m, below which chains count as the same. On nine programs of
+three paths, the best chain of four such that are apart took half the processor time of the best of twelve, and was at
+most 0.1 % slower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +92,10 @@ def find_batches(
     families = getattr(decompositions, "families", ())
     search = _ChainSearch(problem, families, level, deadline.part(_SHARE), listener)
     first, *others = solvers_for(problem.task.solver.name)
-    guesses: list[InitialGuess] = [
-        replace(guess, solver=first.name) for guess in search.best_guesses()
-    ]
-    guesses = screen(guesses, level.in_charts, deadline, listener)
-    yield Batch(guesses, level.refined, fallback=False)
-    for solver in others:
+    guesses = search.best_guesses()
+    for solver in (first, *others):
         with_solver = [replace(guess, solver=solver.name) for guess in guesses]
-        yield Batch(with_solver, level.refined)
+        yield Batch(with_solver, level.refined, fallback=solver is not first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +141,19 @@ class _ChainSearch:
     def _passable(
         self, guess_of: Callable[[_Chain], ChainGuess], chains: Sequence[_Chain]
     ) -> list[ChainGuess]:
-        """Return the guesses of the best chains whose moves get round what is in their way."""
+        """Return the guesses of the best distinct chains whose moves get round what is in their way."""
+        paths = sum(bool(part.task_map.m) for part in self.problem.parts)
+        count = max(1, self.level.in_charts * _PATHS // max(paths, _PATHS))
         found: list[ChainGuess] = []
         blocked: list[PathError] = []
+        chosen: list[np.ndarray] = []
         for chain in chains:
-            if len(found) == _SCREENED * self.level.in_charts:
+            if len(found) == count or (len(blocked) == _TRIED and not found):
                 break
-            if len(blocked) == _TRIED and not found:
-                break
+            ends = np.array([option.ends for option in chain.options])
+            if any(np.abs(ends - other).max() < _APART for other in chosen):
+                continue
+            chosen.append(ends)
             try:
                 found.append(guess_of(chain))
             except PathError as error:
@@ -179,20 +185,19 @@ class _ChainSearch:
             np.array([price_moves(move, ends, begin) for begin in begins]).T + times
         )
         zeros = np.zeros(len(nodes))
-        count = _SCREENED * self.level.in_charts
         if problem.is_closed:
             found = []
             for root in np.flatnonzero(groups == 0):
                 first = np.where(np.arange(len(nodes)) == root, times, np.inf)
                 back = price_moves(move, ends, begins[root])
-                found += find_orders(prices, first, back, groups, count)
+                found += find_orders(prices, first, back, groups, _KEPT)
         else:
             start, end = problem.start, problem.end
             first = times + (
                 zeros if start is None else price_moves(move, begins, start)
             )
             last = zeros if end is None else price_moves(move, ends, end)
-            found = find_orders(prices, first, last, groups, count)
+            found = find_orders(prices, first, last, groups, _KEPT)
         found.sort(key=lambda way: way[0])
         chains = [
             _Chain(tuple(nodes[node][1] for node in way), time) for time, way in found
@@ -263,8 +268,7 @@ class _ChainSearch:
         for option in options:
             prices = price_moves(part, begins, option.ends[0])
             times = prices + [chain.time for chain in chains]
-            count = self.level.in_charts * (_SCREENED if len(options) == 1 else 1)
-            for best in np.argsort(times, kind="stable")[:count]:
+            for best in np.argsort(times, kind="stable")[:_KEPT]:
                 chain = chains[best]
                 time = float(times[best]) + option.time
                 longer.append(_Chain((*chain.options, option), time))
