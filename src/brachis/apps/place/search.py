@@ -1,27 +1,18 @@
-"""Moves a workpiece or the base, within ranges, to where the motion is faster.
-
-The end time jumps where another branch or another way round an obstacle becomes the best, and it falls smoothly between
-the jumps. So plans at seeded places find good regions. From the best of them, steps against the gradient follow, which
-comes from the multipliers of each plan. A step that gives no faster motion is shortened. Each step starts from the
-motion before it, so that it stays in its region.
-"""
+"""The search for a faster place: plans at seeded places, then steps against the gradient."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
-import yaml
 
-from brachis.common.arguments import count
-from brachis.common.progress import Listener, report_progress
-from brachis.common.summary import Summary
+from brachis.apps.place.placing import RANGES, Trial, write_change
+from brachis.common.progress import Listener
 from brachis.errors import BrachisError, InputError, check_names
 from brachis.explain.placement import (
     BASE,
-    COORDINATES,
     PATH,
     find_obstacle,
     list_movable,
@@ -29,29 +20,18 @@ from brachis.explain.placement import (
     pivot_of,
     transform_about,
 )
-from brachis.planner import plan, plan_many, read_arguments
+from brachis.planner import plan, plan_many
 from brachis.problem.problem import Problem
-from brachis.problem.program import bind_task
 from brachis.result import Result
 from brachis.robot import Robot
-from brachis.task import Source, Task, TaskKeywords
+from brachis.task import Task, TaskKeywords
 from brachis.task.program import PathPart
 from brachis.task.settings import FramePlacement
 
 WORKPIECE = "workpiece"
 """Word for the frame of all paths, and name of the frame that is added for paths in the world."""
-RANGES = {
-    name if unit == "m" else f"{name}_deg": (
-        name,
-        1.0 if unit == "m" else np.pi / 180.0,
-    )
-    for name, unit in COORDINATES.items()
-}
-"""Coordinates for which the user gives ranges: the coordinate of a placement, and its factor to m or rad."""
 _QUICK: TaskKeywords = {"effort": "single", "least_motion": False}
 """Settings of all plans but the first and the last one."""
-_DESCENTS = 2
-"""Number of places from which steps are taken."""
 _FIRST_RADIUS = 0.25
 """Length of the first step, as a fraction of the ranges."""
 _LONGEST_RADIUS = 0.5
@@ -65,235 +45,6 @@ _GOOD = 0.5
 """Fraction of the predicted gain from which a step counts as good."""
 _LEAST_GAIN = 1e-3
 """Fraction of the end time that a step must gain; plans of the same task differ by as much."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A place that was tried.
-
-    Attributes
-    ----------
-    change : dict of str to float
-        Change of the placement, m and degrees, by the names in `RANGES`.
-    t_end : float
-        End time, s; infinite without a verified motion.
-    """
-
-    change: dict[str, float]
-    t_end: float
-
-
-@dataclass(frozen=True, repr=False)
-class Placing(Summary):
-    """A faster place for a workpiece or the base.
-
-    Attributes
-    ----------
-    moved : str
-        Name of the frame, or ``base``.
-    change : dict of str to float
-        How the placement changed, m and degrees, along and about the axes of the world.
-    task : Task
-        The changed task.
-    before, after : Result
-        Plans of the task as it was, and of the changed task.
-    trials : tuple of Trial
-        All places that were tried, in their order.
-    """
-
-    moved: str
-    change: dict[str, float]
-    task: Task
-    before: Result
-    after: Result
-    trials: tuple[Trial, ...]
-
-    @property
-    def gain(self) -> float:
-        """Fraction of the end time that the change saves."""
-        return 1.0 - self.after.t_end / self.before.t_end
-
-    def summary(self) -> Mapping[str, object]:
-        """Return the entries that are shown to the user."""
-        return {
-            "moved": self.moved,
-            "by": write_change(self.change) or "nothing",
-            "end time before": f"{self.before.t_end:.4f} s",
-            "end time after": f"{self.after.t_end:.4f} s",
-            "gain": f"{100.0 * self.gain:.1f} %",
-            "places tried": len(self.trials),
-        }
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures as plain data for JSON."""
-        return {
-            "moved": self.moved,
-            "change": self.change,
-            "t_end_before": self.before.t_end,
-            "t_end": self.after.t_end,
-            "gain": self.gain,
-            "verified": self.after.verified,
-            "trials": [
-                {"change": trial.change, "t_end": trial.t_end}
-                for trial in self.trials
-                if np.isfinite(trial.t_end)
-            ],
-        }
-
-
-def write_task(task: Task) -> str:
-    """Write a task as YAML, without the keys that have their defaults."""
-    content = task.model_dump(mode="json", exclude_defaults=True)
-    return yaml.safe_dump({"brachis": task.brachis, **content}, sort_keys=False)
-
-
-def write_change(change: Mapping[str, float]) -> str:
-    """Write a change of a placement with units; coordinates that stay are left out."""
-    return ", ".join(
-        f"{name.removesuffix('_deg')} {value:+.4g} {'deg' if name.endswith('_deg') else 'm'}"
-        for name, value in change.items()
-        if value
-    )
-
-
-def read_range(text: str) -> tuple[str, tuple[float, float]]:
-    """Read a range such as ``x=-0.2,0.2``.
-
-    Raises
-    ------
-    InputError
-    """
-    name, _, ends = text.partition("=")
-    try:
-        low, high = map(float, ends.split(","))
-    except ValueError:
-        raise InputError(
-            "this is not a range",
-            where="--range",
-            found=text,
-            allowed="NAME=FROM,TO, such as x=-0.2,0.2",
-        ) from None
-    return name, (low, high)
-
-
-def place(
-    robot_or_task: Source | Robot | None = None,
-    /,
-    task: Source | None = None,
-    *,
-    move: str = WORKPIECE,
-    ranges: Mapping[str, tuple[float, float]],
-    starts: int = 4,
-    steps: int = 8,
-    jobs: int = 1,
-    listener: Listener | None = None,
-    progress: bool | None = None,
-    **keywords: Unpack[TaskKeywords],
-) -> Placing:
-    """Move a workpiece or the base to where the motion is faster.
-
-    Parameters
-    ----------
-    robot_or_task, task, **keywords
-        As for `brachis.plan`.
-    move : str, optional
-        Name of a frame of the task, ``base``, or ``workpiece`` for the frame of all paths. Bodies of the scene that are
-        placed in the frame move with it. If the paths are given in the world, a frame is added to the task.
-    ranges : mapping of str to (float, float)
-        Smallest and largest change of each coordinate: ``x``, ``y`` and ``z`` along the axes of the world, m;
-        ``roll_deg``, ``pitch_deg`` and ``yaw_deg`` about them, degrees. Other coordinates stay.
-    starts : int, optional
-        Number of places that are tried first, the present one included.
-    steps : int, optional
-        Maximum number of steps from each of the best two places.
-    jobs : int, optional
-        Number of processes for the first places.
-    listener, progress
-        As for `brachis.plan`.
-
-    Returns
-    -------
-    Placing
-
-    Raises
-    ------
-    InputError
-        The task or a range is wrong, or a given posture holds the path in its place.
-    PlanningError
-        The task as it is has no plan.
-
-    Examples
-    --------
-    >>> import brachis
-    >>> placing = brachis.place(
-    ...     "scara3",
-    ...     start="free",
-    ...     path_start=[1.5, -0.3],
-    ...     path=brachis.Line(by=[0.0, 0.6]),
-    ...     task_space=["x", "y"],
-    ...     ranges={"x": (-0.2, 0.2)},
-    ...     starts=1,
-    ...     steps=1,
-    ... )
-    >>> placing.after.t_end <= placing.before.t_end
-    True
-    """
-    _check_ranges(ranges)
-    with report_progress(listener, progress) as report:
-        robot, loaded = read_arguments(robot_or_task, task, keywords)
-        problem = bind_task(robot, loaded)
-        search = _Search.of(problem, loaded, move, ranges, report)
-        report("planning the task as it is")
-        before = plan(robot, loaded, listener=listener, progress=False)
-        start_places = [search.present]
-        if starts > 1:
-            from scipy.stats import qmc
-
-            sampler = qmc.Halton(len(ranges), seed=loaded.search.seed)
-            start_places += list(sampler.random(count(starts, "starts") - 1))
-        candidates = search.plan_starts(robot, start_places, before, jobs)
-        candidates = sorted(candidates, key=lambda candidate: candidate[1].t_end)
-        best = (search.present, before)
-        for candidate in candidates[:_DESCENTS]:
-            found = search.descend(robot, *candidate, steps)
-            best = min(best, found, key=lambda pair: pair[1].t_end)
-        place_found, after = best
-        if after is not before:
-            report("planning the task at the best place")
-            after = _faster(after, search.plan_at(robot, place_found, is_final=True))
-    return Placing(
-        moved=search.moved,
-        change=search.change_at(place_found),
-        task=search.task_at(place_found),
-        before=before,
-        after=after,
-        trials=tuple(search.trials),
-    )
-
-
-def _faster(first: Result, second: Result | None) -> Result:
-    """Return the faster of two results; the second one may be missing."""
-    return first if second is None or first.t_end <= second.t_end else second
-
-
-def _check_ranges(ranges: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse unknown coordinates, and ranges without a width."""
-    check_names("coordinate", ranges, RANGES, "ranges")
-    if not ranges:
-        raise InputError(
-            "no range is given, so nothing can be moved",
-            where="ranges",
-            allowed="a range for at least one coordinate, such as x: (-0.2, 0.2)",
-        )
-    for name, pair in ranges.items():
-        values = np.array(pair, dtype=float)
-        if values.shape != (2,) or not np.isfinite(values).all() or np.ptp(values) <= 0:
-            raise InputError(
-                "this is not a range",
-                where=f"ranges.{name}",
-                found=pair,
-                allowed="a smaller and a larger number, such as (-0.2, 0.2)",
-            )
 
 
 def add_workpiece(task: Task, name: str) -> Task:
@@ -353,7 +104,7 @@ def _find_subject(problem: Problem, move: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class PlaceSearch:
     """A search for a faster place.
 
     Attributes
@@ -390,7 +141,7 @@ class _Search:
         move: str,
         ranges: Mapping[str, tuple[float, float]],
         report: Listener,
-    ) -> _Search:
+    ) -> PlaceSearch:
         """Open the search."""
         subject = _find_subject(problem, move)
         moved = subject
