@@ -11,6 +11,7 @@ Planning           plan, plan_many, transcribe (the nonlinear program itself)
 Many plans         sweep, SweepResult: keys of a task varied over grids or at random, also on a cluster
 Where to put it    place: Placing (a workpiece or the base moved to a faster place)
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
+A program          Program: paths, moves between them, approaches, dwells
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
 A robot            Robot, Robot.with_limits, Robot.with_payload, LimitSpec, read_limits; robots (the included ones)
 A task             Task, load_task; examples (the included task files)
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
     from brachis.task.constructors import Helix as Helix
     from brachis.task.constructors import Line as Line
     from brachis.task.constructors import Spline as Spline
+    from brachis.task.program import Program as Program
     from brachis.timing import SlowTimingWarning as SlowTimingWarning
     from brachis.trajectory import Samples as Samples
     from brachis.trajectory import Trajectory as Trajectory
@@ -128,6 +130,7 @@ _NAMES = {
     "task": "LimitSpec Task fit_path load_task read_limits",
     "task.bodies": "Box Capsule Cylinder HalfSpace Mesh Sphere",
     "task.constructors": "Arc Circle Helix Line Spline",
+    "task.program": "Program",
     "trajectory": "Samples Trajectory",
     "verify": "Verification verify_trajectory",
 }

@@ -33,6 +33,8 @@ _NODES = 8
 """Number of joint paths of each path among which the best order is sought."""
 _TRIED = 6
 """Number of chains after which none is passable."""
+_BESIDE = 4
+"""Number of the best chains so far to whose ends joint paths of the next path should be close."""
 _KEPT = 24
 """Number of chains that are kept at each joint path."""
 _PATHS = 3
@@ -169,14 +171,22 @@ class _ChainSearch:
         paths = [number for number, part in enumerate(parts) if part.task_map.m]
         move = next(part for part in parts if not part.task_map.m)
         nodes: list[tuple[int, _Option]] = []
+        beside = []
+        if problem.start is not None:
+            beside.append(_Chain((_Option(np.array([problem.start] * 2)),)))
         for number in paths:
-            beside = [_Chain((option,)) for _, option in nodes]
-            if problem.start is not None:
-                beside.append(_Chain((_Option(np.array([problem.start] * 2)),)))
-            options = sorted(
-                self._options(number, beside), key=lambda option: option.time
-            )
-            nodes += [(number, option) for option in options[:_NODES]]
+            options = self._options(number, beside)
+            prices = [option.time for option in options]
+            if beside:
+                ends = np.array([option.ends[0] for option in options])
+                home = [
+                    price_moves(move, ends, chain.options[-1].ends[-1])
+                    for chain in beside
+                ]
+                prices = np.min(home, axis=0) + prices
+            chosen = [options[i] for i in np.argsort(prices, kind="stable")[:_NODES]]
+            nodes += [(number, option) for option in chosen]
+            beside = beside or [_Chain((option,)) for option in chosen]
         groups = np.array([paths.index(number) for number, _ in nodes])
         times = np.array([option.time for _, option in nodes])
         begins = np.array([option.ends[0] for _, option in nodes])
@@ -287,7 +297,8 @@ class _ChainSearch:
         part = self.problem.parts[number]
         name = self.problem.sections[number][0].name
         self.listener(f"looking for joint paths of {name}")
-        before = [chain.options[-1].ends[-1] for chain in chains if chain.options]
+        best = sorted(chains, key=lambda chain: chain.time)[:_BESIDE]
+        before = [chain.options[-1].ends[-1] for chain in best if chain.options]
         after = None
         if number + 1 < len(self.problem.parts):
             after = self.problem.parts[number + 1].end

@@ -13,6 +13,7 @@ from brachis.task.load import Source, load_task
 from brachis.task.messages import key_paths
 from brachis.task.models import Task
 from brachis.task.orientation import ToolPose, Transform
+from brachis.task.program import Part
 from brachis.task.scene import CollisionSettings, SceneBody
 from brachis.task.segments import SegmentModel
 from brachis.task.settings import (
@@ -62,6 +63,8 @@ class TaskKeywords(RobotKeywords, total=False):
         | Sequence[SegmentModel | Mapping[str, Any] | Sequence[float]]
         | Array
     )
+    program: Sequence[Part | Mapping[str, Any]]
+    order: Literal["given", "free"]
     start: Posture
     end: Posture
     frames: Mapping[str, Placement | Settings | Transform]

@@ -6,7 +6,7 @@ gap; the arm stops between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -22,6 +22,7 @@ from brachis.task.fields import (
     Positive,
 )
 from brachis.task.limit_models import LimitSpec, ToolLimits
+from brachis.task.messages import validate
 from brachis.task.paths import (
     PathStart,
     Posture,
@@ -145,6 +146,45 @@ ProgramPart = Annotated[
 ]
 
 
+class _Parts(Model):
+    """The parts of a program."""
+
+    program: tuple[ProgramPart, ...]
+
+
+def Program(  # noqa: N802  (made like Line and Arc)
+    parts: Iterable[Part | Mapping[str, Any]],
+) -> tuple[Part, ...]:
+    """Make the parts of a program, which follow one another; ``+`` joins programs.
+
+    Parameters
+    ----------
+    parts : iterable of mapping
+        Parts in the form of a task file: ``{"path": ...}``, ``{"move": "next"}``, ``{"approach": 0.05}``,
+        ``{"retract": 0.05}``, ``{"dwell": 0.5}`` or ``{"payload": ...}``, each with its other keys.
+
+    Returns
+    -------
+    tuple of Part
+        For the keyword ``program`` of `brachis.plan`.
+
+    Raises
+    ------
+    TaskError
+        A part is wrong.
+
+    Examples
+    --------
+    >>> import brachis
+    >>> seam = {"path": brachis.Line(by=[0.0, 0.3])}
+    >>> program = brachis.Program([seam, {"dwell": 0.2}, {"move": "next"}])
+    >>> [part.kind for part in program]
+    ['path', 'dwell', 'move']
+    """
+    content = {"program": list(parts)}
+    return validate(_Parts, content, "Program").program
+
+
 def name_of(part: Part, number: int) -> str:
     """Return the name of a part, whose number counts from 1."""
     return part.name or f"{part.kind} {number}"
@@ -172,13 +212,17 @@ def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
     space = content.get("task_space")
     parts = content["program"]
     if isinstance(parts, Sequence) and not isinstance(parts, str):
-        parts = [
-            {"task_space": space, **part}
-            if isinstance(part, Mapping) and "path" in part
-            else part
-            for part in parts
-        ]
+        parts = [_with_default(part, space) for part in parts]
     return {"start": "free", **content, "program": parts, "task_space": "free"}
+
+
+def _with_default(part: object, space: object) -> object:
+    """Return a part with a task space by default, if it is a path."""
+    if isinstance(part, Part):
+        part = part.model_dump(exclude_unset=True)
+    if not (isinstance(part, Mapping) and "path" in part):
+        return part
+    return {**part, "task_space": part.get("task_space") or space}
 
 
 _MOST_FREE = 12
