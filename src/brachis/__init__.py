@@ -8,8 +8,7 @@
     result.plot()
 
 Planning           plan, plan_many, transcribe (the nonlinear program itself)
-Many plans         sweep, SweepResult: keys of a task varied over grids or at random, also on a cluster
-Where to put it    place: Placing (a workpiece or the base moved to a faster place)
+Many plans         sweep, SweepResult: keys of a task varied; place, Placing: workpiece or base moved to a faster place
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A program          Program: paths, moves between them, approaches, dwells
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
