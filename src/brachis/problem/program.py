@@ -5,13 +5,13 @@ Successive paths with the same settings form one path with stops, and so do a pa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from brachis.errors import PathError
+from brachis.errors import PathError, TaskError
 from brachis.path import Path, path_of
 from brachis.path.rotations import rotation_of
 from brachis.problem.chain import ProblemChain, Section
@@ -30,6 +30,7 @@ from brachis.task import (
     Task,
     name_of,
     path_keys,
+    scene_during,
 )
 from brachis.task.fields import POSITION
 from brachis.task.limit_models import without_defaults
@@ -37,6 +38,7 @@ from brachis.task.messages import validate
 from brachis.task.orientation import ToolPose
 from brachis.task.points.units import quaternions_of
 from brachis.task.program import NEXT, Part
+from brachis.task.scene import SceneBody
 from brachis.task.segments import LineSegment, LineTo, SegmentModel
 from brachis.task.settings import Payload
 
@@ -47,9 +49,11 @@ def bind_task(
     robot: Robot, task: Task, own_limits: Sequence[LimitModel] = ()
 ) -> Problem:
     """Bind a task, or all parts of its program, to a robot; raise InputError as `Problem.of` does."""
-    whole = Problem.of(robot, task, own_limits)
     if not task.program:
-        return whole
+        return Problem.of(robot, task, own_limits)
+    lasting = tuple(body for body in task.scene if body.since == body.until is None)
+    whole_task = task.model_copy(update={"scene": lasting})
+    whole = replace(Problem.of(robot, whole_task, own_limits), task=task)
     ways = list(_ways(task) if task.order == "given" else _free_ways(task))
     ends = [way.end for way in ways]
     if ends[-1] == "free":
@@ -60,9 +64,8 @@ def bind_task(
     for way, *postures in zip(ways, begins, ends, strict=True):
         changed = _robot_of(robot, way)
         before = problems[-1].path if problems else None
-        part_task = _task_of(way, changed, task, before)
         stated = dict(zip(("start", "end"), postures, strict=True))
-        part_task = part_task.model_copy(update=stated)
+        part_task = _task_of(way, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
         problems.append(problem)
         sections.append(list(_sections(way, problem)))
@@ -73,9 +76,10 @@ def bind_task(
 
 @dataclass
 class _Way:
-    """A move, or successive parts along one path, with the numbers of its parts and the payload."""
+    """A move, or successive parts along one path, with the numbers of its parts, the payload and the scene."""
 
     payload: Payload | None
+    scene: tuple[SceneBody, ...]
     parts: list[tuple[int, Part]] = field(default_factory=list)
 
     def of(self, kind: type[Part]) -> list[Any]:
@@ -103,9 +107,14 @@ class _Way:
             total += part.dwell
         return total
 
-    def goes_on_with(self, part: Part) -> bool:
-        """Tell whether a part belongs to the same path."""
-        if isinstance(part, DwellPart | RetractPart):
+    def goes_on_with(self, way: _Way) -> bool:
+        """Tell whether the only part of another way belongs to the same path."""
+        ((_, part),) = way.parts
+        if isinstance(part, DwellPart):
+            return True
+        if (way.payload, way.scene) != (self.payload, self.scene):
+            return False
+        if isinstance(part, RetractPart):
             return True
         paths = self.of(PathPart)
         if not isinstance(part, PathPart) or self.of(MovePart):
@@ -122,18 +131,19 @@ def _ways(task: Task) -> Iterator[_Way]:
     """Yield the ways of a program."""
     payload = task.robot.payload
     way = None
-    for numbered in enumerate(task.program):
-        part = numbered[1]
+    for number, part in enumerate(task.program):
         if isinstance(part, PayloadPart):
             payload = part.payload
             continue
-        is_same = way is not None and way.payload == payload
-        if way is not None and is_same and way.goes_on_with(part):
-            way.parts.append(numbered)
+        begun = _Way(
+            payload, scene_during(task.scene, task.program, number), [(number, part)]
+        )
+        if way is not None and way.goes_on_with(begun):
+            way.parts += begun.parts
             continue
         if way is not None:
             yield way
-        way = _Way(payload, [numbered])
+        way = begun
     if way is not None:
         yield way
 
@@ -144,10 +154,10 @@ def _free_ways(task: Task) -> Iterator[_Way]:
     move = (0, MovePart(move=NEXT, name="move"))
     for number, part in enumerate(task.program):
         if number or task.start != "free":
-            yield _Way(payload, [move])
-        yield _Way(payload, [(number, part)])
+            yield _Way(payload, task.scene, [move])
+        yield _Way(payload, task.scene, [(number, part)])
     if task.end != "free":
-        yield _Way(payload, [move])
+        yield _Way(payload, task.scene, [move])
 
 
 def _robot_of(robot: Robot, way: _Way) -> Robot:
@@ -162,14 +172,27 @@ def _robot_of(robot: Robot, way: _Way) -> Robot:
     return robot
 
 
-def _task_of(way: _Way, robot: Robot, task: Task, before: Path | None) -> Task:
-    """Return the task of a way with free ends. `before` is the path of the way before."""
+def _task_of(
+    way: _Way,
+    robot: Robot,
+    task: Task,
+    before: Path | None,
+    stated: Mapping[str, Posture | str],
+) -> Task:
+    """Return the task of a way. `before` is the path of the way before, `stated` are the postures at both ends."""
+    if not way.of(LimitedPart):
+        raise TaskError(
+            "the payload or the scene changes between a path and its approach or retract",
+            where=way.key,
+            allowed="a path in place of the approach or retract",
+        )
     limited = way.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
+        "order": "given",
         "robot": robot.settings,
-        "start": "free",
-        "end": "free",
+        "scene": way.scene,
+        **stated,
         "tool_limits": limited.tool_limits or task.tool_limits,
     }
     if isinstance(limited, MovePart):
@@ -180,10 +203,11 @@ def _task_of(way: _Way, robot: Robot, task: Task, before: Path | None) -> Task:
     changes["path"] = (*segments[:-1], ending)
     if changes["path_start"] is None and before is not None and before.positions:
         changes["path_start"] = _pose(before, 1.0)
-    plain = task.model_copy(update=changes)
     approaches = way.of(ApproachPart)
     retracts = way.of(RetractPart)
     if approaches or retracts:
+        free = {"end": "free", "start": "free" if approaches else stated["start"]}
+        plain = task.model_copy(update=changes | free)
         _, task_map = bind(robot, plain.task_space, plain.tolerances)
         path = path_of(task_map, validate(Task, plain, way.key))
         if approaches:

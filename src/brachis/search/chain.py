@@ -260,14 +260,31 @@ class _ChainSearch:
         return closed
 
     def _through(self, chains: list[_Chain], number: int) -> list[_Chain]:
-        """Continue chains with a path that begins where they end."""
+        """Continue the best chains with a path that begins where they end."""
         longer = []
-        for chain in chains:
-            start = chain.options[-1].ends[-1] if chain.options else None
+        for chain in sorted(chains, key=lambda chain: chain.time)[:_BESIDE]:
+            start = None
+            if chain.options:
+                start = self._end_on_path(chain.options[-1], number)
             for option in self._options(number, [chain], start):
                 time = chain.time + option.time
                 longer.append(_Chain((*chain.options, option), time))
         return longer
+
+    def _end_on_path(self, option: _Option, number: int) -> np.ndarray:
+        """Return the posture at the end of an option with the virtual joints of the path that follows."""
+        robot = self.problem.parts[number].robot
+        if option.guess is None:
+            return robot.posture(option.ends[-1].tolist(), "program")
+        (posture,) = option.guess.postures_at(np.ones(1))
+        if len(posture) != robot.n:
+            name = self.problem.sections[number][0].name
+            raise TaskError(
+                "two paths with different tolerances or task spaces meet",
+                where=f"program: {name}",
+                allowed="a move between them",
+            )
+        return posture
 
     def _move(
         self, chains: list[_Chain], part: Problem, options: Sequence[_Option]

@@ -39,6 +39,7 @@ from brachis.task.program import (
     RetractPart,
     name_of,
     path_keys,
+    scene_during,
 )
 from brachis.task.schema import json_schema
 from brachis.task.segments import (
@@ -109,6 +110,7 @@ __all__ = [
     "path_keys",
     "read_assignment",
     "read_limits",
+    "scene_during",
     "task_with",
     "with_keys",
 ]

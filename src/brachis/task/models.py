@@ -45,6 +45,7 @@ from brachis.task.program import (
     NEXT,
     ProgramPart,
     find_mistakes,
+    part_names,
     with_task_space,
 )
 from brachis.task.scene import CollisionSettings, SceneBody, SceneSource, name_bodies
@@ -257,6 +258,12 @@ class Task(CheckedModel):
             for i, part in enumerate(self.program)
         }
         check_defined("posture", moves, [NEXT, *self.postures])
+        lives = {
+            f"scene[{i}].{key}": getattr(body, key)
+            for i, body in enumerate(self.scene)
+            for key in ("since", "until")
+        }
+        check_defined("part", lives, part_names(self.program))
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]

@@ -30,6 +30,7 @@ from brachis.task.paths import (
     StatedPath,
     split_path_in_frame,
 )
+from brachis.task.scene import SceneBody
 from brachis.task.settings import Payload
 from brachis.task.tolerances import TaskSpace, Tolerances
 
@@ -188,6 +189,26 @@ def Program(  # noqa: N802  (made like Line and Arc)
 def name_of(part: Part, number: int) -> str:
     """Return the name of a part, whose number counts from 1."""
     return part.name or f"{part.kind} {number}"
+
+
+def part_names(parts: Sequence[Part]) -> list[str]:
+    """Return the names of all parts."""
+    return [name_of(part, number) for number, part in enumerate(parts, 1)]
+
+
+def scene_during(
+    scene: Sequence[SceneBody], parts: Sequence[Part], number: int
+) -> tuple[SceneBody, ...]:
+    """Return the bodies that are there during a part, whose number counts from 0."""
+    names = part_names(parts)
+
+    def is_there(body: SceneBody) -> bool:
+        begin = 0 if body.since is None else names.index(body.since)
+        end = len(names) if body.until is None else names.index(body.until)
+        return begin <= number < end
+
+    always = {"since": None, "until": None}
+    return tuple(body.model_copy(update=always) for body in scene if is_there(body))
 
 
 def path_keys(part: PathPart) -> dict[str, Any]:

@@ -79,6 +79,10 @@ class SceneBody(CheckedModel):
     """Position of the body origin in the world, frame or link, m."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw, degrees."""
+    since: Name | None = None
+    """In a program, name of the part at whose start the body appears. Null: it is there from the beginning."""
+    until: Name | None = None
+    """In a program, name of the part at whose start the body disappears. Null: it stays."""
 
     @property
     def shape(self) -> str:

@@ -197,7 +197,12 @@ def check_rest(motion: CheckedMotion, title: str, states: MotionStates) -> list[
 
 
 def times_of_stops(motion: CheckedMotion) -> np.ndarray:
-    """Return the times, s, at which phases end or begin at stops of the task."""
+    """Return the times, s, at which phases end or begin at stops of the task.
+
+    For a program these are the ends of all phases: where phases meet in motion, its components are checked themselves.
+    """
+    if motion.trajectory.components:
+        return motion.trajectory.phase_ends
     stops = [leg for leg in motion.legs if leg.stops]
     ends = [phase.end for leg in stops for phase in _phases_up_to(motion, leg)]
     return np.unique(ends)

@@ -1,0 +1,327 @@
+"""Programs of parts: known optima, one optimum over all parts, links, orders, and programs that cannot be planned.
+
+The full count of programs is `benchmarks/programs.py`.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import brachis
+from brachis.errors import PathError, TaskError
+from brachis.optimise.links import PostureLink
+from brachis.optimise.path_phase import PathPhase
+from brachis.optimise.path_program import PathProgram
+from brachis.optimise.phase_timing import PhaseTiming
+from brachis.problem.program import bind_task
+from brachis.robot.from_task import robot_for
+from brachis.search.order import find_orders
+from support.effort import QUICK
+from support.slides import X, slides
+
+MASS = 2.0
+FORCE = 16.0
+"""Of a slide, N."""
+HOME = [0.0, 0.5, 0.0, -1.2, 0.0, 1.0, 0.3]
+SEAM = {
+    "name": "seam",
+    "path": [{"line": {"to": [0.5, 0.15, 0.4]}}],
+    "path_start": {"position": [0.5, -0.15, 0.4], "rpy_deg": [180, 0, 0]},
+    "events": [
+        {"name": "arc_on", "lead": 0.02},
+        {"name": "arc_off", "at": "end", "lead": -0.01},
+    ],
+}
+CYCLE = {
+    "start": HOME,
+    "end": "start",
+    "task_space": "pose_free_roll",
+    "program": [
+        {"move": "next"},
+        {"approach": 0.05},
+        SEAM,
+        {"dwell": 0.1},
+        {"retract": 0.05},
+        {"move": {"joints": HOME}},
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def slide():
+    return slides([X], [FORCE], MASS, gravity=[0, 0, 0])
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    return brachis.plan("iiwa14", **CYCLE, **QUICK)
+
+
+def least_time(distance):
+    """Of a slide from rest to rest, by full force either way, s."""
+    return 2.0 * np.sqrt(distance * MASS / FORCE)
+
+
+def plan_slide(slide, parts, **keys):
+    return brachis.plan(slide, program=parts, rest="velocity", **QUICK, **keys)
+
+
+def test_a_slide_goes_there_and_back(slide):
+    there = {"move": {"joints": [0.5]}}
+    back = {"move": {"joints": [0.0]}}
+    result = plan_slide(slide, [there, back], start=[0.0], end="start")
+    assert result.verified
+    assert result.t_end == pytest.approx(2.0 * least_time(0.5), rel=1e-3)
+    assert result.t_end >= 2.0 * least_time(0.5) * (1.0 - 1e-4)
+
+
+def test_two_moves_with_a_dwell_between_them(slide):
+    parts = [
+        {"move": {"joints": [0.5]}},
+        {"dwell": 0.3},
+        {"move": {"joints": [0.7]}},
+    ]
+    result = plan_slide(slide, parts, start=[0.0])
+    assert result.verified
+    ways = [least_time(0.5), 0.3, least_time(0.2)]
+    durations = [part.duration for part in result.trajectory.parts]
+    np.testing.assert_allclose(durations, ways, rtol=1e-3)
+
+
+def test_a_closed_motion_without_a_given_start(slide):
+    there = {"path": [{"line": {"by": [0.4]}}], "path_start": [0.3]}
+    parts = [there, {"move": "next"}]
+    result = plan_slide(slide, parts, task_space=["x"], end="start")
+    assert result.verified
+    assert result.t_end == pytest.approx(2.0 * least_time(0.4), rel=1e-3)
+    first, last = result.trajectory.q[[0, -1]]
+    assert abs(last - first).max() < 1e-9
+
+
+def test_a_program_of_one_path_is_that_path():
+    path = {"path": [{"line": {"by": [0.0, 0.3]}}]}
+    keys = {"task_space": ["x", "y"], "start": [0.5, -1.0, 1.2], **QUICK}
+    alone = brachis.plan("scara3", **path, **keys)
+    as_program = brachis.plan("scara3", program=[path], **keys)
+    assert as_program.verified
+    assert as_program.t_end == pytest.approx(alone.t_end, rel=2e-3)
+
+
+def test_a_cycle_is_verified_and_has_its_parts(cycle):
+    assert cycle.verified
+    motion = cycle.trajectory
+    kinds = [part.kind for part in motion.parts]
+    assert kinds == ["move", "approach", "path", "dwell", "retract", "move"]
+    ends = [part.end for part in motion.parts]
+    begins = [part.begin for part in motion.parts]
+    np.testing.assert_allclose(begins, [0.0, *ends[:-1]], atol=1e-12)
+    assert ends[-1] == pytest.approx(motion.t_end)
+    seam = motion.parts[2]
+    assert motion.parts[3].duration == pytest.approx(0.1)
+    events = {event.name: event.time for event in motion.events}
+    assert events["arc_on"] == pytest.approx(seam.begin - 0.02)
+    assert events["arc_off"] == pytest.approx(seam.end + 0.01)
+    np.testing.assert_allclose(motion.q[[0, -1]], [HOME, HOME], atol=1e-9)
+
+
+def test_the_tool_is_on_the_seam_and_on_its_approach(cycle):
+    """By Pinocchio's placement of the whole motion at the times of the parts."""
+    motion = cycle.trajectory
+    approach, seam, _, retract = motion.parts[1:5]
+    t = np.linspace(seam.begin, seam.end, 41)
+    places, rotations = motion.robot.tool_placements(motion.position(t))
+    np.testing.assert_allclose(places[:, [0, 2]], [[0.5, 0.4]] * 41, atol=1e-8)
+    np.testing.assert_allclose(places[[0, -1], 1], [-0.15, 0.15], atol=1e-8)
+    np.testing.assert_allclose(rotations[:, :, 2], [[0.0, 0.0, -1.0]] * 41, atol=1e-8)
+    ends = np.array([approach.begin, retract.end])
+    places, _ = motion.robot.tool_placements(motion.position(ends))
+    np.testing.assert_allclose(
+        places, [[0.5, -0.15, 0.45], [0.5, 0.15, 0.45]], atol=1e-8
+    )
+
+
+def test_one_optimum_is_faster_than_part_by_part(cycle):
+    """The seam is planned for itself, then the moves to where it begins and from where it ends."""
+    keys = {key: SEAM[key] for key in ("path", "path_start")}
+    space = {"task_space": "pose_free_roll", "start": "free"}
+    seam = brachis.plan("iiwa14", **keys, **space, **QUICK)
+    first, last = seam.trajectory.q[[0, -1], :7]
+    there = brachis.plan("iiwa14", start=HOME, end=first, task_space="free", **QUICK)
+    back = brachis.plan("iiwa14", start=last, end=HOME, task_space="free", **QUICK)
+    total = there.t_end + seam.t_end + back.t_end + 0.1
+    assert cycle.t_end < 0.97 * total
+
+
+def test_a_saved_cycle_is_the_same(cycle, tmp_path):
+    file = tmp_path / "cycle.npz"
+    cycle.save(file)
+    loaded = brachis.Trajectory.load(file)
+    assert loaded.parts == cycle.trajectory.parts
+    assert loaded.events == cycle.trajectory.events
+    assert len(loaded.components) == 3
+    assert brachis.verify_trajectory(loaded).passed
+
+
+def test_the_verification_sees_a_part_that_moved(cycle):
+    motion = cycle.trajectory
+    q = motion.q + np.array([0.0] * 6 + [1e-4])
+    moved = type(motion)(**{**vars_of(motion), "q": q})
+    failures = " ".join(brachis.verify_trajectory(moved).failures)
+    assert "motion of the parts" in failures
+
+
+def vars_of(motion):
+    """Fields of a trajectory, without what it keeps of its own computations."""
+    return {name: getattr(motion, name) for name in type(motion).__dataclass_fields__}
+
+
+def test_a_payload_counts_from_its_place_on(slide):
+    moves = [{"move": {"joints": [0.5]}}, {"move": {"joints": [0.0]}}]
+    loaded = [moves[0], {"payload": {"mass": 2.0}}, moves[1]]
+    result = plan_slide(slide, loaded, start=[0.0])
+    assert result.verified
+    durations = [part.duration for part in result.trajectory.parts]
+    ratio = np.sqrt((MASS + 2.0) / MASS)
+    assert durations[1] == pytest.approx(ratio * durations[0], rel=1e-3)
+
+
+def test_limits_of_a_part_hold_in_it_alone(slide):
+    moves = [
+        {"move": {"joints": [0.5]}, "limits": {"velocity": 0.5}},
+        {"move": {"joints": [0.0]}},
+    ]
+    result = plan_slide(slide, moves, start=[0.0])
+    assert result.verified
+    first, second = (part.duration for part in result.trajectory.parts)
+    assert first == pytest.approx(0.5 / 0.5 + 0.5 * MASS / FORCE, rel=1e-3)
+    assert second == pytest.approx(least_time(0.5), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def linked():
+    """A chain of a move, a seam and a move, with its program, and guesses of all its parts."""
+    task = brachis.load_task({"brachis": 1, "robot": {"urdf": "iiwa14"}, **in_full()})
+    problem = bind_task(robot_for(None, task.robot), task)
+    result = brachis.plan(task, **QUICK)
+    return problem, result.candidate.refined
+
+
+def in_full():
+    program = [{"move": "next"}, SEAM, {"move": {"joints": HOME}}]
+    return {**CYCLE, "start": {"joints": HOME}, "program": program}
+
+
+def test_slopes_of_links_agree_with_differences(linked):
+    _, solved = linked
+    program = solved.program
+    links = [link for link in program.links if isinstance(link, PostureLink)]
+    assert len(links) == 2
+    rng = np.random.default_rng(3)
+    x = solved.x
+    direction = rng.normal(size=len(x)) * (program.x_lower < program.x_upper)
+    step = 1e-6 * direction
+    for link in links:
+        rows, columns = link.pattern(program.phases, program.first_variables)
+        entries = link.jacobian(program.split(x))
+        dense = np.zeros((link.size, len(x)))
+        np.add.at(dense, (rows, columns), entries)
+        ahead, behind = (link.rows(program.split(x + sign * step)) for sign in (1, -1))
+        np.testing.assert_allclose(
+            dense @ direction, 0.5e6 * (ahead - behind), rtol=1e-5, atol=1e-6
+        )
+
+
+def test_slopes_of_the_program_over_the_path_agree_with_differences(linked):
+    problem, solved = linked
+    phases = []
+    for phase, motion in zip(
+        solved.program.phases, solved.program.motions(solved.x), strict=True
+    ):
+        curves = motion.at(np.linspace(0.0, motion.t_end, 201))[0]
+        timing = PhaseTiming.through(phase, curves, 200)
+        phases.append(PathPhase(phase, timing, 4, 14))
+    over_path = PathProgram(phases, solved.program.links)
+    x = over_path.start
+    dense = np.zeros((len(over_path.lower), len(x)))
+    places = (over_path.jacobian_rows, over_path.jacobian_columns)
+    np.add.at(dense, places, over_path.jacobian(x))
+    rng = np.random.default_rng(4)
+    direction = rng.normal(size=len(x)) * (over_path.x_lower < over_path.x_upper)
+    step = 1e-6 * direction
+    change = over_path.rows(x + step) - over_path.rows(x - step)
+    count = sum(link.width for link in solved.program.links)
+    linked_rows = slice(len(change) - count, None)
+    np.testing.assert_allclose(
+        (dense @ direction)[linked_rows], 0.5e6 * change[linked_rows], atol=1e-6
+    )
+    met = over_path.meet(x)
+    assert np.abs(over_path.rows(met)[linked_rows]).max() < 1e-12
+    assert len(problem.joins) == 2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_orders_are_the_best_of_all(seed):
+    """Against all permutations, with two nodes in every group."""
+    rng = np.random.default_rng(seed)
+    groups = np.repeat(np.arange(5), 2)
+    prices = rng.uniform(1.0, 2.0, (10, 10))
+    first, last = rng.uniform(0.0, 1.0, (2, 10))
+    best = min(
+        first[way[0]]
+        + last[way[-1]]
+        + sum(prices[a, b] for a, b in itertools.pairwise(way))
+        for order in itertools.permutations(range(5))
+        for way in itertools.product(*(np.flatnonzero(groups == g) for g in order))
+    )
+    found = find_orders(prices, first, last, groups, 4)
+    price, way = found[0]
+    assert price == pytest.approx(best)
+    assert sorted(groups[way]) == [0, 1, 2, 3, 4]
+    assert [each for each, _ in found] == sorted(each for each, _ in found)
+
+
+def test_a_free_order_visits_seams_along_the_way():
+    """Lines on a slide's way, listed out of order: the best order sweeps over them."""
+    slide = slides([X], [FORCE], MASS, gravity=[0, 0, 0])
+    seams = [
+        {"path": [{"line": {"by": [0.1]}}], "path_start": [x], "name": f"at {x}"}
+        for x in (0.9, 0.3, 1.5)
+    ]
+    result = plan_slide(
+        slide, seams, task_space=["x"], order="free", start=[0.0], end=[2.0]
+    )
+    assert result.verified
+    names = [part.name for part in result.trajectory.parts if part.kind == "path"]
+    assert names == ["at 0.3", "at 0.9", "at 1.5"]
+
+
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        ({"program": [{"approach": 0.1}]}, "an approach leads to a path"),
+        ({"program": [{"retract": 0.1}, SEAM]}, "a retract leads away from a path"),
+        ({"program": [{"dwell": 0.1}]}, "nothing moves"),
+        ({"program": [{"move": "next"}, {"move": "next"}, SEAM]}, "two moves meet"),
+        ({"program": [SEAM], "task_space": "free"}, "a path needs a task space"),
+        ({"program": [{"move": "nowhere"}]}, "this posture is not defined"),
+        ({"program": [SEAM, {"move": "next"}], "order": "free"}, "cannot be free"),
+        ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
+    ],
+)
+def test_wrong_programs_are_refused(changes, text):
+    with pytest.raises(TaskError, match=text):
+        brachis.plan("iiwa14", **{**CYCLE, **changes})
+
+
+def test_a_move_from_nowhere_is_refused():
+    with pytest.raises(TaskError, match="nothing determines"):
+        brachis.plan("iiwa14", **{**CYCLE, "start": "free", "end": "free"})
+
+
+def test_a_seam_out_of_reach_is_named():
+    far = {**SEAM, "path_start": {"position": [2.5, 0, 0.4], "rpy_deg": [180, 0, 0]}}
+    with pytest.raises(PathError, match="seam"):
+        brachis.plan(
+            "iiwa14", **{**CYCLE, "end": "free", "program": [{"move": "next"}, far]}
+        )
