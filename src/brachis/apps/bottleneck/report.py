@@ -235,7 +235,9 @@ def report(
         sensitivities=costs,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
-        timing=None if recovered else find_timing_gap(trajectory, limits),
+        timing=None
+        if recovered or trajectory.components
+        else find_timing_gap(trajectory, limits),
         check=checked,
         reference=best,
         reference_sought=reference,
