@@ -258,7 +258,16 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
         )
         changed = limits.model_copy(update={"process_speed": sections})
         task = problem.task.model_copy(update={"tool_limits": changed})
-        return _with_legs(replace(problem, task=task))
+        segments = tuple(
+            segment.model_copy(update={"speed": after})
+            if segment.speed == before
+            else segment
+            for segment in task.path
+        )
+        if segments == task.path:
+            return _with_legs(replace(problem, task=task))
+        # The leads of segments are longer at a higher speed.
+        return _with_task(problem, task.model_copy(update={"path": segments}))
 
     for speed in sorted({section.speed for section in limits.process_speed}):
         sections = [
