@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/placement.py [--seed 0] [--count 20] [--step 0.003] [--intervals 30] [--cycle] [--save]
 
-Random lines in a random frame, on three of the included robots. Every task is planned; `result.sensitivities.gradients`
+Random lines in a random frame, on three of the included robots. Every task is planned; `result.gradients`
 has the derivatives by x, y and z of the frame. Then the frame is moved by the step to both sides along each axis, and
 the task is planned again from the first motion, so that the same local optimum is found. The knots are given:
 with ``intervals: auto`` two plans of a task may differ by the spline tolerance, as much as such a step gains.
@@ -82,7 +82,7 @@ def gradient_of(result: brachis.Result) -> np.ndarray:
     """Return the derivatives by x, y and z of the frame, (3,), s/m."""
     found = {
         entry.figure: entry.derivative
-        for entry in result.sensitivities.gradients
+        for entry in result.gradients
         if entry.subject == FRAME
     }
     return np.array([found[axis] for axis in "xyz"], dtype=float)

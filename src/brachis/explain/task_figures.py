@@ -260,7 +260,7 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
         task = problem.task.model_copy(update={"tool_limits": changed})
         segments = tuple(
             segment.model_copy(update={"speed": after})
-            if segment.speed == before
+            if getattr(segment, "speed", None) == before
             else segment
             for segment in task.path
         )

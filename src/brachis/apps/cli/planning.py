@@ -320,7 +320,7 @@ def place(
             )
             after = placing.after
             data = placing.to_dict()
-    entries = after.sensitivities.gradients
+    entries = after.gradients
     data["gradients"] = [asdict(entry) for entry in entries]
     if out is not None and not gradients:
         write_text(write_task(placing.task), out)

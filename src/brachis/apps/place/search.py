@@ -235,7 +235,7 @@ class PlaceSearch:
         """Return the derivatives of the end time by the fractions of the ranges, (c,), s; zero if they are unknown."""
         known = {
             entry.figure: entry.derivative
-            for entry in result.sensitivities.gradients
+            for entry in result.gradients
             if entry.subject in (self.subject, self.moved)
         }
         derivatives = [
