@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.explain.placement import COORDINATES
+from brachis.explain.placement import COORDINATES, move_in_task, transform_about
+from brachis.task.settings import place_frame
 
 LINE = {
     "brachis": 1,
@@ -126,6 +127,23 @@ def test_gradients_are_saved_with_the_motion(line, tmp_path):
     saved = brachis.Trajectory.load(tmp_path / "result.npz")
     assert saved.sensitivities.gradients == line.gradients
     assert "Where it stands" in brachis.report.make_report(saved).html
+
+
+def test_a_frame_moves_with_the_frames_in_it():
+    frames = {
+        "table": {"xyz": [1.0, 0.2, 0.0], "rpy_deg": [0.0, 0.0, 90.0]},
+        "part": {"xyz": [0.1, 0.3, 0.0], "frame": "table"},
+    }
+    task = brachis.load_task({**LINE, "frames": frames})
+    transform = transform_about({"x": 0.4, "yaw": 0.2}, np.array([1.0, 0.2, 0.0]))
+    for name in frames:
+        moved = move_in_task(task, name, transform)
+        after = place_frame(moved.frames, name).transform
+        before = place_frame(task.frames, name).transform
+        assert np.allclose(after.homogeneous, (transform * before).homogeneous)
+    part = place_frame(move_in_task(task, "table", transform).frames, "part")
+    carried = transform * place_frame(task.frames, "part").transform
+    assert np.allclose(part.transform.homogeneous, carried.homogeneous)
 
 
 def test_a_moved_post_costs_what_its_gradient_says():

@@ -67,6 +67,14 @@ def test_the_base_moves_while_the_path_stays():
     assert placing.gain > 0.02
 
 
+def test_places_out_of_reach_are_passed_over():
+    placing = brachis.place(TASK, ranges={"x": (-0.1, 4.0)}, starts=4, steps=0)
+    times = [trial.t_end for trial in placing.trials]
+    assert max(times) == float("inf")
+    assert placing.after.verified
+    assert len(placing.to_dict()["trials"]) < len(times)
+
+
 def test_what_cannot_be_moved_is_refused():
     held = {**TASK, "start": {"joints": [0.3, -1.0, 1.0]}}
     del held["path_start"]
