@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from brachis.explain.task_figures import LeastTime, OptimalMotion
 from brachis.path import Path
 from brachis.path.sequence import PathFrame
 from brachis.problem.problem import Problem
-from brachis.robot import Robot, bind
+from brachis.robot.from_task import with_settings
 from brachis.robot.task_map.protocol import AXES, position_rows
 from brachis.task import Placement, Task
 from brachis.task.settings import FramePlacement, Payload, place_frame
@@ -231,7 +231,7 @@ def _move_part(part: Problem, subject: str, transform: SE3) -> Problem:
         return part
     task = move_in_task(part.task, subject, transform)
     if subject == BASE:
-        robot = _with_settings(part, mounting=task.robot.mounting)
+        robot = with_settings(part.robot, mounting=task.robot.mounting)
         return replace(part, task=task, robot=robot)
     return replace(part, task=task)
 
@@ -251,14 +251,4 @@ def _load_part(part: Problem, mass: float) -> Problem:
     payload = part.robot.settings.payload or Payload(mass=mass)
     if part.robot.settings.payload is not None:
         payload = payload.model_copy(update={"mass": payload.mass + mass})
-    return replace(part, robot=_with_settings(part, payload=payload))
-
-
-def _with_settings(part: Problem, **changes: Any) -> Robot:
-    """Return the robot of a part with changed settings, and with the same limits and friction."""
-    robot = part.robot
-    gravity = tuple(robot.model.gravity.linear.tolist())
-    settings = robot.settings.model_copy(update={"gravity": gravity, **changes})
-    changed = Robot.from_settings(settings, robot.source, robot.urdf)
-    changed, _ = bind(changed, part.task.task_space, part.task.tolerances)
-    return replace(changed, limits=robot.limits, friction=robot.friction)
+    return replace(part, robot=with_settings(part.robot, payload=payload))

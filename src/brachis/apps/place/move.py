@@ -49,8 +49,8 @@ def place(
         Name of a frame of the task, ``base``, or ``workpiece`` for the frame of all paths. Bodies of the scene that are
         placed in the frame move with it. If the paths are given in the world, a frame is added to the task.
     ranges : mapping of str to (float, float)
-        Smallest and largest change of each coordinate: ``x``, ``y`` and ``z`` along the axes of the world, m;
-        ``roll_deg``, ``pitch_deg`` and ``yaw_deg`` about them, degrees. Other coordinates stay.
+        Smallest change, at most 0, and largest change, at least 0, of each coordinate: ``x``, ``y`` and ``z`` along the
+        axes of the world, m; ``roll_deg``, ``pitch_deg`` and ``yaw_deg`` about them, degrees. Other coordinates stay.
     starts : int, optional
         Number of places that are tried first, the present one included.
     steps : int, optional
@@ -94,12 +94,12 @@ def place(
         search = PlaceSearch.of(problem, loaded, move, ranges, report)
         report("planning the task as it is")
         before = plan(robot, loaded, listener=listener, progress=False)
-        start_places = [search.present]
-        if starts > 1:
+        start_places = []
+        if count(starts, "starts") > 1:
             from scipy.stats import qmc
 
             sampler = qmc.Halton(len(ranges), seed=loaded.search.seed)
-            start_places += list(sampler.random(count(starts, "starts") - 1))
+            start_places = list(sampler.random(starts - 1))
         candidates = search.plan_starts(robot, start_places, before, jobs)
         candidates = sorted(candidates, key=lambda candidate: candidate[1].t_end)
         best = (search.present, before)

@@ -144,7 +144,7 @@ def read_range(text: str) -> tuple[str, tuple[float, float]]:
 
 
 def check_ranges(ranges: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse unknown coordinates, and ranges without a width."""
+    """Refuse unknown coordinates, and ranges without a width or without the present place."""
     check_names("coordinate", ranges, RANGES, "ranges")
     if not ranges:
         raise InputError(
@@ -154,10 +154,11 @@ def check_ranges(ranges: Mapping[str, tuple[float, float]]) -> None:
         )
     for name, pair in ranges.items():
         values = np.array(pair, dtype=float)
-        if values.shape != (2,) or not np.isfinite(values).all() or np.ptp(values) <= 0:
+        is_pair = values.shape == (2,) and np.isfinite(values).all()
+        if not (is_pair and values[0] <= 0.0 <= values[1] and np.ptp(values)):
             raise InputError(
                 "this is not a range",
                 where=f"ranges.{name}",
                 found=pair,
-                allowed="a smaller and a larger number, such as (-0.2, 0.2)",
+                allowed="two numbers with 0, the present place, between them or at an end, such as (-0.2, 0.2)",
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from brachis.planner import plan, plan_many
 from brachis.problem.problem import Problem
 from brachis.result import Result
 from brachis.robot import Robot
+from brachis.robot.from_task import with_settings
 from brachis.task import Task, TaskKeywords
 from brachis.task.program import PathPart
 from brachis.task.settings import FramePlacement
@@ -154,8 +155,8 @@ class PlaceSearch:
 
     @property
     def present(self) -> np.ndarray:
-        """The present place, or the nearest one within the ranges, as fractions of the ranges, (c,)."""
-        return ((0.0 - self.low) / (self.high - self.low)).clip(0.0, 1.0)
+        """The present place as fractions of the ranges, (c,)."""
+        return -self.low / (self.high - self.low)
 
     def change_at(self, u: np.ndarray) -> dict[str, float]:
         """Return the change of the placement at fractions of the ranges, (c,), m and degrees."""
@@ -178,16 +179,14 @@ class PlaceSearch:
         before: Result,
         jobs: int,
     ) -> list[tuple[np.ndarray, Result]]:
-        """Plan at the first places, and return those with a verified motion."""
-        found = []
-        if not any(self.change_at(places[0]).values()):
-            found.append((places[0], before))
-            self.trials.append(Trial(self.change_at(places[0]), before.t_end))
-            places = places[1:]
+        """Plan at the first places, and return those with a verified motion; the plan of the present place is known."""
+        self.trials.append(Trial(self.change_at(self.present), before.t_end))
+        found = [(self.present, before)]
         self.report(f"planning at {len(places)} other places")
         tasks = [self.task_at(u) for u in places]
-        robots = [_robot_at(robot, task) for task in tasks]
-        pairs = list(zip(robots, tasks, strict=True))
+        pairs = [
+            (with_settings(robot, mounting=task.robot.mounting), task) for task in tasks
+        ]
         outcomes = plan_many(pairs, jobs=jobs, progress=False, **_QUICK)
         for u, outcome in zip(places, outcomes, strict=True):
             result = self._keep(u, outcome)
@@ -205,7 +204,7 @@ class PlaceSearch:
     ) -> Result | None:
         """Plan at a place, from a known motion; None without a verified motion. The final plan is not a quick one."""
         task = self.task_at(u)
-        moved = _robot_at(robot, task)
+        moved = with_settings(robot, mounting=task.robot.mounting)
         try:
             outcome: Result | BrachisError = plan(
                 moved,
@@ -269,12 +268,3 @@ class PlaceSearch:
             result = trial
             gradient = self.gradient(result)
         return u, result
-
-
-def _robot_at(robot: Robot, task: Task) -> Robot:
-    """Return the robot with the mounting of a task."""
-    if robot.settings.mounting == task.robot.mounting:
-        return robot
-    settings = robot.settings.model_copy(update={"mounting": task.robot.mounting})
-    moved = Robot.from_settings(settings, robot.source, robot.urdf)
-    return replace(moved, limits=robot.limits, friction=robot.friction)
