@@ -57,15 +57,24 @@ def extract_motion(problem: Problem, program: Program, x: np.ndarray) -> Traject
     if not problem.is_chain:
         return extract_trajectory(problem.task, program, x)
     motions = join_motions(program, x)
-    components = []
+    trajectories = []
     first = 0
-    begin = 0.0
     for part in problem.parts:
         legs = slice(first, first + len(part.legs))
-        trajectory = make_trajectory(part.task, program.phases[legs], motions[legs])
+        trajectories.append(
+            make_trajectory(part.task, program.phases[legs], motions[legs])
+        )
+        first = legs.stop
+    return compose(problem, trajectories)
+
+
+def compose(problem: Problem, trajectories: Sequence[Trajectory]) -> Trajectory:
+    """Join the trajectories of the parts of a problem, with the waits between them, to the motion of a move."""
+    components = []
+    begin = 0.0
+    for part, trajectory in zip(problem.parts, trajectories, strict=True):
         components.append((begin, trajectory))
         begin += trajectory.t_end + part.legs[-1].dwell
-        first = legs.stop
     composed = _compose(problem, components, begin)
     sections = list(_time_sections(problem, components, begin))
     events = [

@@ -93,11 +93,11 @@ def find_batches(
     level = SEARCH_LEVELS[problem.task.search.effort][0]
     families = getattr(decompositions, "families", ())
     search = _ChainSearch(problem, families, level, deadline.part(_SHARE), listener)
-    first, *others = solvers_for(problem.task.solver.name)
+    solvers = solvers_for(problem.task.solver.name)
     guesses = search.best_guesses()
-    for solver in (first, *others):
+    for solver in solvers:
         with_solver = [replace(guess, solver=solver.name) for guess in guesses]
-        yield Batch(with_solver, level.refined, fallback=solver is not first)
+        yield Batch(with_solver, level.refined, fallback=solver is not solvers[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +259,11 @@ class _ChainSearch:
             closed += self._move([chain], part, [goal])
         return closed
 
+    def _name_of(self, number: int) -> str:
+        """Return the name of the path of a problem, whose approach comes before it."""
+        sections = self.problem.sections[number]
+        return next(section.name for section in sections if section.kind == "path")
+
     def _through(self, chains: list[_Chain], number: int) -> list[_Chain]:
         """Continue the best chains with a path that begins where they end."""
         longer = []
@@ -278,7 +283,7 @@ class _ChainSearch:
             return robot.posture(option.ends[-1].tolist(), "program")
         (posture,) = option.guess.postures_at(np.ones(1))
         if len(posture) != robot.n:
-            name = self.problem.sections[number][0].name
+            name = self._name_of(number)
             raise TaskError(
                 "two paths with different tolerances or task spaces meet",
                 where=f"program: {name}",
@@ -312,7 +317,7 @@ class _ChainSearch:
         With a start posture, all begin there.
         """
         part = self.problem.parts[number]
-        name = self.problem.sections[number][0].name
+        name = self._name_of(number)
         self.listener(f"looking for joint paths of {name}")
         best = sorted(chains, key=lambda chain: chain.time)[:_BESIDE]
         before = [chain.options[-1].ends[-1] for chain in best if chain.options]

@@ -26,6 +26,7 @@ splines are laid along the timing.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -38,6 +39,7 @@ from brachis.optimise.mesh import adapt_mesh
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import FINE, improve_joint_paths, is_timing_all
 from brachis.optimise.transcription import program_of
+from brachis.search.by_parts import finish_by_parts
 from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
@@ -118,6 +120,12 @@ def finish_candidate(
     """
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
+    program = candidate.program
+    if candidate.problem.is_chain and not (is_timing_all(program) or program.means):
+        finish_part = partial(
+            finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
+        )
+        return finish_by_parts(candidate, finish_part)
     is_followed = follows_timing(candidate.guess, candidate.program)
     is_short = is_followed and deadline.left < LITTLE_TIME
     share = _IF_SHORT if is_short else _BEFORE_REFINEMENT

@@ -199,8 +199,8 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        known = (self._problem, self._decompositions, self._latest, self._listener)
-        for batch in find_batches(*known):
+        where = (self._problem, self._decompositions)
+        for batch in find_batches(*where, self._latest, self._listener):
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
@@ -325,9 +325,10 @@ class Search:
 
     def explain(self) -> BrachisError:
         """Return the error that tells why no motion was found."""
-        failure = explain_holding(self.guesses) or explain_postures(self.guesses)
+        guesses = [alone for guess in self.guesses for alone in guess.alone]
+        failure = explain_holding(guesses) or explain_postures(guesses)
         if not self.interrupted:
-            failure = failure or explain_speeds(self.guesses, are_tried=True)
+            failure = failure or explain_speeds(guesses, are_tried=True)
         if failure is not None:
             return failure
         # The time limit of the search may have ended every solve before the solve's own time limit.

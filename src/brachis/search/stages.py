@@ -80,6 +80,11 @@ class InitialGuess(Summary):
     is_improved: bool = False
 
     @property
+    def alone(self) -> tuple[InitialGuess, ...]:
+        """The guesses of single tasks of which the guess consists."""
+        return (self,)
+
+    @property
     def legs(self) -> list[np.ndarray]:
         """The parts of the joint path on the legs, (S, 1 + r) each."""
         legs = self.problem.legs
@@ -146,6 +151,11 @@ class ChainGuess(InitialGuess):
         origin = "; ".join(part.origin for part in parts)
         known = (problem, most.joint_map, np.empty((0, 1)), estimate, origin)
         return cls(*known, most.family, most.solver, parts=tuple(parts))
+
+    @property
+    def alone(self) -> tuple[InitialGuess, ...]:
+        """The guesses of the parts."""
+        return self.parts
 
     @property
     def legs(self) -> list[np.ndarray]:

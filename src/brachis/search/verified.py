@@ -20,6 +20,7 @@ from brachis.search.stages import (
     RankedCandidate,
     facts_of,
 )
+from brachis.trajectory import Trajectory
 from brachis.verify import Verification, verify_trajectory
 
 _DENSER = 4
@@ -70,8 +71,9 @@ def verify(
     candidate: RankedCandidate | FinishedCandidate,
     before: tuple[SolverReport, ...],
     refined: SolvedProgram,
+    motion: Trajectory | None = None,
 ) -> Candidate:
-    """Extract the trajectory of a refined program and verify it.
+    """Extract the trajectory of a refined program, unless it is given, and verify it.
 
     Parameters
     ----------
@@ -79,6 +81,7 @@ def verify(
     before : tuple of SolverReport
         Reports of earlier solves.
     refined : SolvedProgram
+    motion : Trajectory, optional
 
     Returns
     -------
@@ -89,7 +92,7 @@ def verify(
     verification = None
     if refined.converged and np.isfinite(refined.violation):
         with contextlib.suppress(UnreachableError):
-            trajectory = extract_motion(problem, refined.program, refined.x)
+            trajectory = motion or extract_motion(problem, refined.program, refined.x)
             verification = verify_trajectory(trajectory, own_limits=problem.own_limits)
     joint_map = refined.program.phases[0].joint_map
     tolerance = problem.task.refinement.tolerance
