@@ -60,6 +60,14 @@ def tx90l() -> str:
     return robot(figures, "tx90l", figures["joints"])
 
 
+def tx90l_positioner() -> str:
+    """Staubli TX90L beside a positioner."""
+    cell, arm = read_figures("tx90l_positioner"), read_figures("tx90l_rail")
+    del arm["links"]["world"], arm["visuals"]["world"]
+    both = {part: {**cell[part], **arm[part]} for part in ("links", "visuals")}
+    return robot(both, cell["robot"], [*cell["joints"], *arm["joints"]])
+
+
 def alone(name: str) -> str:
     """Build a robot of which everything stands in its own figures."""
     figures = read_figures(name)
@@ -111,6 +119,7 @@ def ur10_rail() -> str:
 MAKERS: dict[str, Callable[[], str]] = {
     "tx90l_rail/robot.urdf": tx90l_rail,
     "tx90l_rail/arm.urdf": tx90l,
+    "tx90l_positioner/robot.urdf": tx90l_positioner,
     **{
         f"{name}/robot.urdf": partial(alone, name)
         for name in ("iiwa14", "gen3", "arm8")

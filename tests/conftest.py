@@ -130,6 +130,15 @@ def line_trajectory(line_result: Any) -> Any:
 
 
 @pytest.fixture(scope="session")
+def cycle() -> Any:
+    """The plan of a program."""
+    import brachis
+    from support.cycle import CYCLE
+
+    return brachis.plan(CYCLE)
+
+
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """A Chromium that is installed here, without a window; one for all tests, as its driver allows."""
     playwright = pytest.importorskip(

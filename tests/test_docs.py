@@ -67,7 +67,7 @@ def test_files_that_the_pages_write_into_a_clone_are_ignored():
     text = "\n".join(page.read_text() for page in pages)
     pattern = r'(?:--out |save\("|[ .](?:write|report)\((?:\S+, )?")([\w.]+)'
     names = {"out13", *re.findall(pattern, text)} - {"FILE"}
-    assert names > {"first.yaml", "out", "motion.html", "lines", "cell.urdf"}
+    assert names > {"first.yaml", "out", "motion.html", "lines"}
     assert {
         name
         for name in names

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.robot import dynamics
 from brachis.verify import verify_trajectory
 from support.effort import QUICK
 from support.mujoco_models import follow, mujoco_model
@@ -52,3 +53,21 @@ def test_the_planned_torque_follows_the_path(motion):
     states = follow(trajectory, model, order, t)
     places = np.array([data.xpos[tool].copy() for data, _ in states])
     assert np.linalg.norm(places - positions, axis=1).max() < 1e-4
+
+
+def test_a_cell_with_a_positioner():
+    robot = brachis.robots.tx90l_positioner
+    model, order = mujoco_model(robot)
+    workpiece, tool = (model.body(name).id for name in ("workpiece", "tool"))
+    data = mujoco.MjData(model)
+    states = np.random.default_rng(0).normal(size=(3, 20, robot.n))
+    planned = dynamics.torque(robot, *states)
+    positions, _ = robot.tool_placements(states[0])
+    for k, (q, v, a) in enumerate(states.swapaxes(0, 1)):
+        data.qpos[order], data.qvel[order], data.qacc[order] = q, v, a
+        mujoco.mj_inverse(model, data)
+        error = data.qfrc_inverse[order] - planned[k]
+        assert np.abs(error / robot.limits.torque).max() < 1e-6
+        away = data.xpos[tool] - data.xpos[workpiece]
+        seen = data.xmat[workpiece].reshape(3, 3).T @ away
+        np.testing.assert_allclose(seen, positions[k], atol=1e-9)

@@ -207,7 +207,7 @@ class InputError(BrachisError):
     ...     brachis.robots.path_of("scara4")
     ... except brachis.InputError as error:
     ...     print(error.valid[-3:])
-    ('scara3', 'tx90l_rail', 'ur10_rail')
+    ('tx90l_positioner', 'tx90l_rail', 'ur10_rail')
     """
 
     exit_code = 2

@@ -22,7 +22,7 @@ from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
 from brachis.common.threads import use_one_thread
 from brachis.common.words import write_count
-from brachis.errors import BrachisError, InputError
+from brachis.errors import BrachisError, InputError, TaskError
 from brachis.optimise.layout import SHORTEST_TIME
 from brachis.problem.feasibility import check_regular
 from brachis.problem.plausibility import (
@@ -48,7 +48,14 @@ from brachis.search.least_motion import LeastMotion, find_least_motion
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
 from brachis.search.stages import FinishedCandidate
-from brachis.task import Source, Task, TaskKeywords, check_keywords, task_with
+from brachis.task import (
+    Source,
+    Task,
+    TaskKeywords,
+    check_keywords,
+    part_names,
+    task_with,
+)
 from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import MotionSource, motion_of
 
@@ -271,10 +278,14 @@ def read_arguments(
 
 
 def _report_plan(robot: Robot, task: Task, report: Listener) -> None:
-    """Report the robot, the path and the task space of a plan."""
+    """Report the robot, and the path and the task space of a plan or the parts of its program."""
+    joints = write_count(robot.n, "joint")
+    if task.program:
+        parts = ", ".join(part_names(task.program))
+        report(f"planning for {joints} a program of {len(task.program)} parts: {parts}")
+        return
     rows = task.task_space
     space = rows if isinstance(rows, str) else f"[{', '.join(rows)}]"
-    joints = write_count(robot.n, "joint")
     segments = write_count(len(task.path), "segment")
     report(f"planning for {joints} along a path of {segments}, task space {space}")
 
@@ -322,6 +333,12 @@ def transcribe(
     """
     ik.check_families(families)
     robot, loaded_task = read_arguments(robot_or_task, task, keywords)
+    if loaded_task.program:
+        raise TaskError(
+            "a program is not one NLP",
+            where="program",
+            allowed="a path or a move; brachis.plan plans programs",
+        )
     problem = Problem.of(robot, loaded_task, own_limits)
     start = first_guess(problem, decompositions_of(problem, families))
     return TaskProgram(start), start.family

@@ -73,9 +73,13 @@ def _is_name(source: str | os.PathLike[str]) -> bool:
     return begins or bool(difflib.get_close_matches(word, known, cutoff=0.75))
 
 
+_WORKPIECES = {"tx90l_positioner": "workpiece"}
+"""Links that carry the workpiece, of robots with a positioner."""
+
+
 @cache
 def _robot(name: str) -> Robot:
-    return Robot.from_urdf(path_of(name))
+    return Robot.from_urdf(path_of(name), workpiece_frame=_WORKPIECES.get(name))
 
 
 def __getattr__(name: str) -> Robot:

@@ -9,7 +9,7 @@ import brachis
 from brachis.errors import InputError, UnknownNameError, UrdfError
 from brachis.robot.urdf_elements import read_tree
 
-ROBOTS = brachis.robots.names()
+ROBOTS = [name for name in brachis.robots.names() if name != "tx90l_positioner"]
 
 
 def model_of(name):

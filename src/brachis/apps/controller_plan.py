@@ -110,7 +110,7 @@ def plan_for_controller(
         result = plan(
             robot,
             loaded.model_copy(update={"robot": robot.settings}),
-            start_from=start_from,
+            start_from=None if loaded.program else start_from,
             own_limits=own_limits,
             listener=listener,
         )

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import yaml
 
 from brachis import planner
@@ -34,6 +35,7 @@ from brachis.robot.limits import UrdfLimit
 from brachis.robot.plausibility import report_issues
 from brachis.robot.task_map.protocol import AXES
 from brachis.robot.urdf import default_chain, read_chain, read_file
+from brachis.robot.urdf_bodies import placement_matrix
 from brachis.task import LimitSpec, load_task
 from brachis.task.fields import plain
 from brachis.task.yaml_reader import read_yaml
@@ -109,6 +111,17 @@ def _draw_postures(robot: Robot) -> np.ndarray:
     return np.where((rounded > lower) & (rounded < upper), rounded, drawn)
 
 
+def heights(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Return the heights of the tool frame above the plane on which the robot stands, (K,) m, for postures (K, n).
+
+    The plane contains the origin of the base frame. Its normal is the z axis of the URDF's root link.
+    """
+    base = robot.model.getFrameId(robot.base_frame, pin.FrameType.BODY)
+    floor = robot.model.frames[base].placement.translation
+    up = placement_matrix(robot.settings.mounting)[:3, 2]
+    return (robot.tool_placements(q)[0] - floor) @ up
+
+
 def _quality(
     task_map: TaskMap, postures: np.ndarray, reach: float, lowest: float
 ) -> np.ndarray:
@@ -134,7 +147,7 @@ def _quality(
         limits = robot.limits
         shares = np.maximum(torque / limits.torque_upper, torque / limits.torque_lower)
         quality[shares.max(axis=1) >= 0.7] = 0.0
-    quality[robot.heights(postures) < lowest] = 0.0
+    quality[heights(robot, postures) < lowest] = 0.0
     return quality
 
 

@@ -59,7 +59,9 @@ def list_movable(problem: Problem) -> list[str]:
         for name in frames
         if any(_is_carried(frames, inner, name) for inner in used | bodies)
     ]
-    return [*carrying, *([PATH] if None in used else []), BASE]
+    # Paths in the frame of a positioner move with its base.
+    bases = [] if problem.robot.settings.workpiece_frame else [BASE]
+    return [*carrying, *([PATH] if None in used else []), *bases]
 
 
 def transform_about(change: Mapping[str, float], pivot: np.ndarray) -> SE3:

@@ -12,6 +12,7 @@ joint path. If there was no such program, the joint path is timed again with eac
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,11 +41,28 @@ _LEAST_COST = 1e-9
 
 def figures_of(program: Program) -> dict[LimitFigure, list[LimitBound]]:
     """List the figures of a program's limits, each with all its bounds; every phase may have its own limit objects."""
+    names = _name_figures(program)
     figures: defaultdict[LimitFigure, list[LimitBound]] = defaultdict(list)
     for limit in program.limits:
         for bound in limit.bounds:
-            figures[_figure(limit, bound)].append((limit, bound))
+            figures[names[id(limit), bound]].append((limit, bound))
     return figures
+
+
+def _name_figures(program: Program) -> dict[tuple[int, Bound], LimitFigure]:
+    """Identify the figures of all bounds; the label has the figure if parts of a program have different ones."""
+    bounds = [(limit, bound) for limit in program.limits for bound in limit.bounds]
+    values: defaultdict[LimitFigure, set[float]] = defaultdict(set)
+    for limit, bound in bounds:
+        values[_figure(limit, bound)].add(bound.figure)
+    names = {}
+    for limit, bound in bounds:
+        label, side = _figure(limit, bound)
+        if len(values[label, side]) > 1:
+            kind = f"{label.kind} of {bound.figure:.4g}{label.after}"
+            label = replace(label, kind=kind)
+        names[id(limit), bound] = (label, side)
+    return names
 
 
 def _figure(limit: Limit, bound: Bound) -> LimitFigure:
@@ -108,6 +126,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
     Sensitivities
         The sensitivities to limits that a slower motion does not relieve are zero.
     """
+    names = _name_figures(solved.program)
     changes: defaultdict[LimitFigure, float] = defaultdict(float)
     bounds: dict[LimitFigure, Bound] = {}
     for phase, x in solved.program.split(solved.x):
@@ -124,7 +143,7 @@ def sensitivities_of_timing(solved: SolvedProgram) -> Sensitivities:
                 violation = limit.violation(limit.values(motion))
                 is_near = violation.max(axis=0) > -_NEAR
             for bound in limit.bounds:
-                figure = _figure(limit, bound)
+                figure = names[id(limit), bound]
                 bounds[figure] = bound
                 if is_near[bound.column]:
                     sides = {None: [0, 1], "lower": [0], "upper": [1]}[bound.side]

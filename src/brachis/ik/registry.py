@@ -33,7 +33,7 @@ from brachis.ik.snapping import TOLERANCE, PolishedSolver, SnappedChain, snap_ax
 from brachis.ik.solver_checks import check_answers, ranges_to_check
 from brachis.ik.spherical_wrist import spherical_wrist
 from brachis.robot import Robot, TaskMap
-from brachis.robot.task_map import JointSpace, task_map_of
+from brachis.robot.task_map import task_map_of
 from brachis.robot.task_map.protocol import ANGLES, AXES, POSE_ROWS
 
 BUILTIN: tuple[Family, ...] = (
@@ -235,7 +235,7 @@ def find_all(
     A virtual joint of the tool that has a range is always redundant, because closed forms do not respect ranges.
     """
     r = robot.n - task_map.m
-    if r < 0 or isinstance(task_map, JointSpace):
+    if r < 0 or not task_map.is_of_tool:
         return []
     matcher = _Matcher(robot, task_map, families)
     always = tuple(joint.name for joint in robot.tool_joints if joint.is_ranged)

@@ -9,6 +9,7 @@ exponentials; R. M. Murray, Z. Li, S. S. Sastry, A Mathematical Introduction to 
 /* Python holds the same structure; see chain.py. n is the number of joints. */
 typedef struct {
     long joints;
+    long carriers;               /* see dynamics.c */
     const double *turns;         /* (n): 1 for a revolute joint, 0 for a prismatic one */
     const double *axes;          /* (n, 3): unit vectors */
     const double *points;        /* (n, 3): on the axes, m */

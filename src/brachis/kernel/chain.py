@@ -39,7 +39,7 @@ _SHAPES = {
 class _Chain(ctypes.Structure):
     """The structure `chain` of chain.h."""
 
-    _fields_ = declare_fields(f"l joints; p {' '.join(_SHAPES)}")
+    _fields_ = declare_fields(f"l joints carriers; p {' '.join(_SHAPES)}")
 
 
 class TorqueDerivatives(NamedTuple):
@@ -84,6 +84,9 @@ class Chain(Structured):
     friction : (n, 4) ndarray
         For each joint: rotor inertia, kg m^2; viscous term, Nm s; Coulomb term, Nm; v_eps of ``tanh(qdot / v_eps)``,
         rad/s. For a prismatic joint the units are kg, N s/m, N and m/s.
+    carriers : int
+        Number of joints, the first ones, that carry the workpiece, last joint first. For torques, they are a chain of
+        their own from the world, and so are the joints after them.
     """
 
     revolute: np.ndarray
@@ -96,6 +99,7 @@ class Chain(Structured):
     inertias: np.ndarray
     gravity: np.ndarray
     friction: np.ndarray
+    carriers: int = 0
 
     @property
     def n(self) -> int:
@@ -108,7 +112,7 @@ class Chain(Structured):
             as_contiguous(getattr(self, name), shape_of(letters, sizes))
             for name, letters in _SHAPES.items()
         ]
-        structure = _Chain(self.n, *map(address, arrays))
+        structure = _Chain(self.n, self.carriers, *map(address, arrays))
         structure.arrays = arrays
         return structure
 

@@ -14,7 +14,10 @@ About the world's origin B needs no 6 x 6 matrix. For one body of inertia J, mom
 with (w, v), it is 2 B (a, b) = (E a, 2 a x l) with E a = tr(J) a x w + 2 w x (J a) + 2 h x (a x v): all else cancels by
 Jacobi's identity. E and l are summed over the bodies.
 
-Rotors and friction of each joint come on top: armature qddot + viscous qdot + coulomb tanh(qdot / speed). */
+Rotors and friction of each joint come on top: armature qddot + viscous qdot + coulomb tanh(qdot / speed).
+
+The first joints of a chain may be carriers of the workpiece: a chain of their own from the world, last joint first. The
+other joints begin at the world again. All steps below go through the joints in this order, from the world outwards. */
 
 #include "motion.h"
 
@@ -56,6 +59,24 @@ static inline vec times(const inertia *J, vec a)
 static inline vec apply(const matrix *E, vec a)
 {
     return add(add(scale(E->x, a.x), scale(E->y, a.y)), scale(E->z, a.z));
+}
+
+/* The joint of a step. */
+static inline long joint_at(const chain *arm, long step)
+{
+    return step < arm->carriers ? arm->carriers - 1 - step : step;
+}
+
+/* The first step of the chain to which a step belongs. */
+static inline long first_step(const chain *arm, long step)
+{
+    return step < arm->carriers ? 0 : arm->carriers;
+}
+
+/* Whether a step is the last one of its chain. */
+static inline int is_last(const chain *arm, long step)
+{
+    return step == arm->joints - 1 || step == arm->carriers - 1;
 }
 
 /* Move the chain behind joint i by its coordinate q, and return the joint's axis. */
@@ -164,11 +185,13 @@ static inline void add_bodies(bodies *sum, const bodies *body)
     }
 }
 
-/* Acceleration of the base, against gravity. */
-static inline twist gravity_upwards(const chain *arm)
+/* Placement and motion of the world, which accelerates against gravity. */
+static inline void start_at_world(const chain *arm, displacement *placed, twist *v, twist *a)
 {
     vec none = constant((double[3]){0.0, 0.0, 0.0});
-    return (twist){none, subtract(none, constant(arm->gravity))};
+    *placed = at_zero();
+    *v = (twist){none, none};
+    *a = (twist){none, subtract(none, constant(arm->gravity))};
 }
 
 /* Take the motion (v, a) past a joint with axis S and psi = v x S. */
@@ -205,10 +228,13 @@ void brachis_torques(
         twist S[n];
         bodies body[n];
         pack resistance[n];
-        displacement placed = at_zero();
-        twist v = {0};
-        twist a = gravity_upwards(arm);
-        for (long i = 0; i < n; i++) {
+        displacement placed;
+        twist v, a;
+        for (long step = 0; step < n; step++) {
+            long i = joint_at(arm, step);
+            if (step == first_step(arm, step)) {
+                start_at_world(arm, &placed, &v, &a);
+            }
             pack rate = gather(qdot, count, n, k, i);
             pack acceleration = gather(qddot, count, n, k, i);
             pack slope;
@@ -220,7 +246,11 @@ void brachis_torques(
             move_body(&body[i], v, a);
         }
         wrench f = {0};
-        for (long i = n - 1; i >= 0; i--) {
+        for (long step = n - 1; step >= 0; step--) {
+            long i = joint_at(arm, step);
+            if (is_last(arm, step)) {
+                f = (wrench){0};
+            }
             f.torque = add(f.torque, body[i].torque);
             f.force = add(f.force, body[i].force);
             scatter(pair(S[i], f) + resistance[i], torques, count, n, k, i);
@@ -244,10 +274,13 @@ typedef struct {
 static void find_joint_terms(const chain *arm, long count, long k, const double **states, const joint_terms *of)
 {
     long n = arm->joints;
-    displacement placed = at_zero();
-    twist v = {0};
-    twist a = gravity_upwards(arm);
-    for (long i = 0; i < n; i++) {
+    displacement placed;
+    twist v, a;
+    for (long step = 0; step < n; step++) {
+        long i = joint_at(arm, step);
+        if (step == first_step(arm, step)) {
+            start_at_world(arm, &placed, &v, &a);
+        }
         pack qdot = gather(states[1], count, n, k, i);
         pack qddot = gather(states[2], count, n, k, i);
         resist(arm, i, qdot, qddot, &of->friction_qdot[i]);
@@ -263,16 +296,25 @@ static void find_joint_terms(const chain *arm, long count, long k, const double 
     }
 }
 
-/* Row i up to the diagonal: what joint i feels of joints j <= i. */
-static void write_row(const chain *arm, long i, const joint_terms *of, const torque_partials *by)
+/* Row of a joint up to the diagonal: what it feels of the joints before it. Joints of the other chain have no share. */
+static void write_row(const chain *arm, long step, const joint_terms *of, const torque_partials *by)
 {
     long n = arm->joints;
+    long i = joint_at(arm, step);
+    long first = first_step(arm, step);
     const bodies *body = &of->behind[i];
     twist S = of->S[i];
     wrench I_S = apply_inertia(body, S);
     vec B_S = {dot(body->E.x, S.w), dot(body->E.y, S.w), dot(body->E.z, S.w)}; /* angular part of 2 B' S */
     B_S = add(B_S, cross(scale(body->momentum, all(2.0)), S.v));
-    for (long j = 0; j <= i; j++) {
+    for (long before = 0; before < first; before++) {
+        long at = i * n + joint_at(arm, before);
+        by->tau_q[at] = by->tau_qdot[at] = by->M[at] = all(0.0);
+        at = joint_at(arm, before) * n + i;
+        by->tau_q[at] = by->tau_qdot[at] = by->M[at] = all(0.0);
+    }
+    for (long before = first; before <= step; before++) {
+        long j = joint_at(arm, before);
         long at = i * n + j;
         by->tau_q[at] = pair(of->phi[j], I_S) + dot(B_S, of->psi[j].w);
         by->tau_qdot[at] = 2.0 * pair(of->psi[j], I_S) + dot(B_S, of->S[j].w);
@@ -285,9 +327,11 @@ static void write_row(const chain *arm, long i, const joint_terms *of, const tor
     }
 }
 
-/* Column i above the diagonal: what joints j < i feel of joint i. */
-static void write_column(long n, long i, const joint_terms *of, const torque_partials *by)
+/* Column of a joint above the diagonal: what the joints before it feel of it. */
+static void write_column(const chain *arm, long step, const joint_terms *of, const torque_partials *by)
 {
+    long n = arm->joints;
+    long i = joint_at(arm, step);
     const bodies *body = &of->behind[i];
     twist S = of->S[i];
     twist psi = of->psi[i];
@@ -301,7 +345,8 @@ static void write_column(long n, long i, const joint_terms *of, const torque_par
         add(scale(I_psi.torque, all(2.0)), apply(&body->E, S.w)),
         add(scale(I_psi.force, all(2.0)), cross(S.w, l)),
     };
-    for (long j = 0; j < i; j++) {
+    for (long before = first_step(arm, step); before < step; before++) {
+        long j = joint_at(arm, before);
         by->tau_q[j * n + i] = pair(of->S[j], f_q);
         by->tau_qdot[j * n + i] = pair(of->S[j], f_qdot);
     }
@@ -315,12 +360,12 @@ static void differentiate(const chain *arm, long count, long k, const double **s
     pack friction_qdot[n];
     const joint_terms of = {S, psi, phi, behind, friction_qdot};
     find_joint_terms(arm, count, k, states, &of);
-    for (long i = n - 1; i >= 0; i--) {
-        if (i < n - 1) {
-            add_bodies(&behind[i], &behind[i + 1]);
+    for (long step = n - 1; step >= 0; step--) {
+        if (!is_last(arm, step)) {
+            add_bodies(&behind[joint_at(arm, step)], &behind[joint_at(arm, step + 1)]);
         }
-        write_row(arm, i, &of, by);
-        write_column(n, i, &of, by);
+        write_row(arm, step, &of, by);
+        write_column(arm, step, &of, by);
     }
 }
 
@@ -378,17 +423,23 @@ void brachis_mass_matrices(const chain *arm, long count, const double *q, double
         twist S[n];
         bodies behind[n];
         displacement placed = at_zero();
-        for (long i = 0; i < n; i++) {
+        for (long step = 0; step < n; step++) {
+            long i = joint_at(arm, step);
+            if (step == arm->carriers) {
+                placed = at_zero();
+            }
             S[i] = move_axis(arm, i, gather(q, count, n, k, i), &placed);
             behind[i] = place_body(arm, i, &placed);
         }
-        for (long i = n - 1; i >= 0; i--) {
-            if (i < n - 1) {
-                add_bodies(&behind[i], &behind[i + 1]);
+        for (long step = n - 1; step >= 0; step--) {
+            long i = joint_at(arm, step);
+            if (!is_last(arm, step)) {
+                add_bodies(&behind[i], &behind[joint_at(arm, step + 1)]);
             }
             wrench I_S = apply_inertia(&behind[i], S[i]);
-            for (long j = 0; j <= i; j++) {
-                pack M_ij = pair(S[j], I_S);
+            for (long before = 0; before <= step; before++) {
+                long j = joint_at(arm, before);
+                pack M_ij = before < first_step(arm, step) ? all(0.0) : pair(S[j], I_S);
                 M_ij += j == i ? arm->friction[4 * i] : 0.0;
                 scatter(M_ij, matrices, count, n * n, k, i * n + j);
                 scatter(M_ij, matrices, count, n * n, k, j * n + i);

@@ -169,7 +169,7 @@ def build_own_limits(
         _check_functions(limit, robot)
         if has_check(model):
             moments = sample_moments(robot)
-            tau = moments.torque_of(robot.chain)
+            tau = moments.torque_of(robot.dynamic_chain)
             motion = (moments.q, moments.qdot, moments.qddot, tau)
             few = 1 + len(limit.labels) % 2  # moments, not as many as values
             check_ratios(

@@ -123,7 +123,7 @@ class JointLimit(Limit):
     def kernel_quantity(self, chain: Chain) -> ScaledQuantity | None:
         """Describe the values; None for subclasses, whose values may differ."""
         name = _QUANTITIES.get(type(self))
-        if name is None or self._robot.chain is not chain:
+        if name is None or self._robot.dynamic_chain is not chain:
             return None
         return ScaledQuantity(name, self._joints, self._middle, self._scale, chain)
 
@@ -243,7 +243,7 @@ class TorqueLimit(_TorqueLimit, HasLatticeWeights):
     refusal = "cannot hold the arm against gravity"
 
     def lattice_weights(self, q: np.ndarray) -> tuple[np.ndarray, None]:
-        return self._scale_rows(self._robot.chain.mass_matrices(q)), None
+        return self._scale_rows(self._robot.dynamic_chain.mass_matrices(q)), None
 
 
 class TorqueRateLimit(_DynamicLimit):

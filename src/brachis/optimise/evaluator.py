@@ -43,7 +43,7 @@ class Evaluator:
         counts = [len(limit.lower) for limit in self.limits]
         means = [limit.guarantee.is_mean for limit in self.limits]
         self.is_mean = np.repeat(np.array(means, dtype=bool), counts)
-        chain = joint_map.robot.chain
+        chain = joint_map.robot.dynamic_chain
         quantities = [limit.kernel_quantity(chain) for limit in self.limits]
         self._groups = ValueGroups(quantities, counts)
 

@@ -325,9 +325,8 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Issue]:
 
 def _masses(robot: Robot) -> Iterator[Issue]:
     size = max(1.0, reach(robot))
-    bodies = list(robot.model.inertias)[1:]
-    for name, body in zip(robot.joint_names, bodies, strict=True):
-        where = f"URDF inertials that joint {name} moves"
+    for body in robot.urdf_dynamics.bodies:
+        where = f"URDF inertials that joint {body.joint} moves"
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
         yield from _figure("body mass", body.mass, size**2, where)
         yield from _figure("body inertia", moment, body.mass, where)

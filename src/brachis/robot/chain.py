@@ -1,6 +1,8 @@
-"""The chain of a model in the form that the kernel needs: at the zero posture, in the world frame."""
+"""The chain of a model in the form that the kernel needs, at the zero posture: for kinematics and for torques."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -29,12 +31,7 @@ def chain_of(
     linear = columns[:3].T
     angular = columns[3:].T
     revolute = np.linalg.norm(angular, axis=1) > 0.5
-    inertias = list(model.inertias)[1:]
-    placements = list(data.oMi)[1:]
-    bodies = [
-        placement.act(inertia)
-        for placement, inertia in zip(placements, inertias, strict=True)
-    ]
+    bodies = _bodies(model, data)[1:]
     tool = pin.updateFramePlacement(model, data, tool_frame)
     return Chain(
         revolute=revolute,
@@ -44,7 +41,59 @@ def chain_of(
         tool_rotation=np.array(tool.rotation),
         masses=np.array([body.mass for body in bodies]),
         centers=np.array([body.lever for body in bodies]),
-        inertias=np.array([body.inertia[np.triu_indices(3)] for body in bodies]),
+        inertias=_inertias(bodies),
         gravity=np.array(model.gravity.linear),
         friction=np.zeros((model.nq, 4)) if friction is None else friction,
     )
+
+
+def chain_in_world(
+    model: pin.Model, chain: Chain, carriers: int, world: tuple[int, np.ndarray]
+) -> Chain:
+    """Describe a chain that begins at a workpiece in the world frame, for torques.
+
+    Seen from the workpiece, a carrier moves the world; in the world, it moves the bodies on the other side.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+    chain : Chain
+        Result of `chain_of`.
+    carriers : int
+        Number of joints that carry the workpiece.
+    world : tuple of int and (4, 4) ndarray
+        Number of the joint before the world, and the world's placement in the joint's frame.
+    """
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.zeros(model.nq))
+    seen = path_frame_in_world(data, world)
+    bodies = _bodies(model, data)
+    del bodies[carriers]  # the world
+    bodies = [seen.act(body) for body in bodies]
+    senses = np.where(np.arange(chain.n) < carriers, -1.0, 1.0)
+    return replace(
+        chain,
+        axes=senses[:, None] * chain.axes @ seen.rotation.T,
+        points=chain.points @ seen.rotation.T + seen.translation,
+        carriers=carriers,
+        masses=np.array([body.mass for body in bodies]),
+        centers=np.array([body.lever for body in bodies]),
+        inertias=_inertias(bodies),
+    )
+
+
+def path_frame_in_world(data: pin.Data, world: tuple[int, np.ndarray]) -> pin.SE3:
+    """Return the placement in the world of the frame of the paths, for placed joints and `Robot.world`."""
+    joint, placement = world
+    return (data.oMi[joint] * pin.SE3(placement)).inverse()
+
+
+def _bodies(model: pin.Model, data: pin.Data) -> list[pin.Inertia]:
+    """Place the inertias of the bodies before, between and after the joints."""
+    pairs = zip(data.oMi, model.inertias, strict=True)
+    return [placement.act(inertia) for placement, inertia in pairs]
+
+
+def _inertias(bodies: list[pin.Inertia]) -> np.ndarray:
+    """Return moments of inertia as in `Chain`, (n, 6)."""
+    return np.array([body.inertia[np.triu_indices(3)] for body in bodies])

@@ -54,7 +54,7 @@ class SharedTorques:
 def _chain_with_masses(robot: Robot) -> Chain:
     """Return the chain of a robot; refuse a robot without masses."""
     robot.check_masses("torques")
-    return robot.chain
+    return robot.dynamic_chain
 
 
 def torque(

@@ -76,7 +76,7 @@ def robot_from_settings(
     return Robot.from_settings(named, str(path), urdf_text)
 
 
-_FRAMES = ("tool_frame", "base_frame", "locked_joints")
+_FRAMES = ("tool_frame", "base_frame", "workpiece_frame", "locked_joints")
 """Settings that determine the joints of the chain."""
 _PER_JOINT: dict[str, object] = {
     **{
@@ -209,6 +209,7 @@ def _combine(
         frames.get("tool_frame"),
         frames.get("base_frame"),
         tuple(frames.get("locked_joints", {}).items()),
+        frames.get("workpiece_frame"),
     )
     if "limits" in written:
         moving = without_joints(task_settings.limits, chain.locked)
@@ -271,6 +272,8 @@ def in_use(robot: Robot, qddot: np.ndarray | None = None) -> dict[str, str]:
             used[name] = (
                 f"at {_vector(placement.xyz)} m, roll, pitch, yaw {_vector(placement.rpy_deg)} deg"
             )
+    if settings.workpiece_frame is not None:
+        used["paths"] = f"in the frame of {settings.workpiece_frame}"
     used["gravity"] = f"{_vector(robot.model.gravity.linear)} m/s^2"
     if settings.speed_override != 1.0:
         used["speed override"] = (

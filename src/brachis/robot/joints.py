@@ -6,7 +6,7 @@ Units of joint quantities depend on the unit of the joint's position: rad for re
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -56,3 +56,17 @@ def shown_unit(unit: str, *, degrees: bool) -> tuple[str, float]:
     if degrees and unit.partition("/")[0] == "rad":
         return f"deg{unit.removeprefix('rad')}", 180.0 / math.pi
     return unit, 1.0
+
+
+def write_values(
+    values: np.ndarray, quantity: str, position_units: Sequence[str]
+) -> str:
+    """Write the values of a joint quantity, (n,), with their units."""
+    units = [UNITS[quantity][unit] for unit in position_units]
+    numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
+    if len(set(units)) == 1:
+        return f"{', '.join(numbers)} {units[0]}"
+    pairs = zip(numbers, units, strict=True)
+    return ", ".join(
+        number if number == "none" else f"{number} {unit}" for number, unit in pairs
+    )

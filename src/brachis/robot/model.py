@@ -32,7 +32,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
     UrdfError
         Pinocchio cannot build the model.
     InputError
-        No rigid body can have the inertia of the payload.
+        No rigid body can have the inertia of the payload, or the tool stands still.
     """
     try:
         full = pin.buildModelFromXML(chain.xml)
@@ -52,13 +52,20 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             frame.name = frame.name.removeprefix(LINK)
     model.gravity.linear = np.array(settings.gravity)
     model.armature = np.zeros(model.nv)
-    mounting = _se3(settings.mounting)
-    model.jointPlacements[1] = mounting * model.jointPlacements[1]
+    base = _se3(settings.base_placement)
+    model.jointPlacements[1] = base * model.jointPlacements[1]
     for frame in list(model.frames)[1:]:  # the first one is the world itself
         if frame.parentJoint == 0:
-            frame.placement = mounting * frame.placement
+            frame.placement = base * frame.placement
     tool = model.frames[model.getFrameId(chain.tool_frame, pin.FrameType.BODY)]
     if settings.payload is not None:
+        if chain.dynamics.carriers == len(chain.joint_names):
+            raise InputError(
+                "the tool does not move, so that a payload has no effect",
+                where="robot.payload",
+                found=f"tool_frame {chain.tool_frame}",
+                hint="State the mass of the workpiece in the URDF",
+            )
         inertia = _inertia(settings.payload)
         model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
     tool.placement = tool.placement * _se3(settings.tool_offset)

@@ -17,9 +17,9 @@ from brachis.common.arguments import check_keywords
 from brachis.common.summary import Summary
 from brachis.errors import InputError, TaskError, check_names
 from brachis.kernel import Chain
-from brachis.robot.chain import chain_of
+from brachis.robot.chain import chain_in_world, chain_of
 from brachis.robot.friction import Friction
-from brachis.robot.joints import UNITS
+from brachis.robot.joints import write_values
 from brachis.robot.limits import (
     Limits,
     UrdfLimit,
@@ -132,6 +132,9 @@ class Robot(Summary):
         base_frame : str, optional
             Link at the beginning of the chain. Default: the root link. Positions are in the world frame, which is the
             root link of the URDF unless `mounting` places it elsewhere.
+        workpiece_frame : str, optional
+            Link that carries the workpiece. Paths and the tool's positions are then in its frame. The joints that carry
+            it come first in the chain, the last one at the beginning.
         gravity : (3,) sequence of float, optional
             Gravitational acceleration in the world frame, m/s^2. Default: (0, 0, -9.81).
         locked_joints : mapping of str to float, optional
@@ -233,6 +236,7 @@ class Robot(Summary):
             settings.tool_frame,
             settings.base_frame,
             tuple(settings.locked_joints.items()),
+            settings.workpiece_frame,
         )
         names = chain.joint_names
         spec = check_limits(without_joints(settings.limits, chain.locked), names)
@@ -249,7 +253,7 @@ class Robot(Summary):
             urdf_limits=chain.limits,
             urdf_dynamics=chain.dynamics,
             friction=friction,
-            settings=_without_defaults(settings.model_copy(update={"limits": spec})),
+            settings=settings.model_copy(update={"limits": spec}).without_defaults(),
             source=source,
             urdf=text,
         )
@@ -349,14 +353,7 @@ class Robot(Summary):
 
     def in_words(self, values: np.ndarray, quantity: str = "position") -> str:
         """Write the values of a quantity, (n,), with their units."""
-        units = [UNITS[quantity][unit] for unit in self.position_units]
-        numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
-        if len(set(units)) == 1:
-            return f"{', '.join(numbers)} {units[0]}"
-        pairs = zip(numbers, units, strict=True)
-        return ", ".join(
-            number if number == "none" else f"{number} {unit}" for number, unit in pairs
-        )
+        return write_values(values, quantity, self.position_units)
 
     @property
     def has_masses(self) -> bool:
@@ -427,8 +424,27 @@ class Robot(Summary):
 
     @cached_property
     def chain(self) -> Chain:
-        """The chain in the form that the compiled kernel needs."""
+        """The chain in the form that the compiled kernel needs, in the frame of the paths."""
         return chain_of(self.model, self.frame_id, self.friction.table)
+
+    @cached_property
+    def dynamic_chain(self) -> Chain:
+        """The same chain for torques. It differs only if there is a workpiece frame."""
+        if self.settings.workpiece_frame is None:
+            return self.chain
+        carriers = self.urdf_dynamics.carriers
+        return chain_in_world(self.model, self.chain, carriers, self.world)
+
+    @cached_property
+    def world(self) -> tuple[int, np.ndarray]:
+        """Number of the joint before the world, and the world's placement, (4, 4), in the joint's frame.
+
+        Without a workpiece frame, no joint is before the world.
+        """
+        if self.settings.workpiece_frame is None:
+            return 0, np.eye(4)
+        joint, root = self.urdf_dynamics.links[self.urdf_dynamics.root]
+        return joint, root @ np.linalg.inv(placement_matrix(self.settings.mounting))
 
     def check_masses(self, *users: str) -> None:
         """Refuse features that need masses, by default those of the task, if the URDF lacks masses.
@@ -455,7 +471,7 @@ class Robot(Summary):
             yield data
 
     def tool_placement(self, q: ArrayLike | Mapping[str, float]) -> pin.SE3:
-        """Return the placement of the tool frame in the world frame in one posture.
+        """Return the placement of the tool frame in one posture, in the world or in the workpiece frame.
 
         Parameters
         ----------
@@ -471,7 +487,7 @@ class Robot(Summary):
         return data.oMf[self.frame_id].copy()
 
     def tool_placements(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions, (K, 3), m, and rotations, (K, 3, 3), of the tool frame in the world in postures (K, n)."""
+        """Return positions, (K, 3), m, and rotations, (K, 3, 3), of the tool frame in postures (K, n)."""
         positions = np.empty((len(q), 3))
         rotations = np.empty((len(q), 3, 3))
         tool = self.frame_id
@@ -480,21 +496,3 @@ class Robot(Summary):
             positions[k] = placement.translation
             rotations[k] = placement.rotation
         return positions, rotations
-
-    def heights(self, q: np.ndarray) -> np.ndarray:
-        """Return the heights of the tool frame above the plane on which the robot stands, (K,) m, for postures (K, n).
-
-        The plane contains the origin of the base frame. Its normal is the z axis of the URDF's root link.
-        """
-        base = self.model.getFrameId(self.base_frame, pin.FrameType.BODY)
-        floor = self.model.frames[base].placement.translation
-        up = placement_matrix(self.settings.mounting)[:3, 2]
-        return (self.tool_placements(q)[0] - floor) @ up
-
-
-def _without_defaults(settings: RobotSettings) -> RobotSettings:
-    """Return the settings without those that have their default value, so that these can be set later."""
-    default = RobotSettings()
-    return RobotSettings(
-        **{key: value for key, value in settings if value != getattr(default, key)}
-    )

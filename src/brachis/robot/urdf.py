@@ -37,6 +37,7 @@ from brachis.robot.urdf_elements import (
     numbers_of,
     read_tree,
 )
+from brachis.robot.workpiece import carrying_joints, tree_seen_from
 
 LINK = "link:"
 """Prefix of link names in the URDF that Pinocchio reads, which distinguishes them from joint names."""
@@ -133,7 +134,7 @@ class UrdfChain:
     locked : dict of str to float
         Position at which each of the other moving joints is held, rad or m.
     tool_frame, base_frame : str
-        Link names.
+        Links at the end and at the beginning of the chain.
     xml : str
         The URDF that Pinocchio reads. In it ``continuous`` joints are ``revolute`` joints without a range, so that
         every joint has one coordinate; unsupported joints outside the chain are fixed; and names of links begin with
@@ -158,6 +159,7 @@ def read_chain(
     tool_frame: str | None = None,
     base_frame: str | None = None,
     locked_joints: tuple[tuple[str, float], ...] = (),
+    workpiece_frame: str | None = None,
 ) -> UrdfChain:
     """Read a URDF and find the chain from `base_frame` to `tool_frame`. The result is cached for further plans.
 
@@ -173,19 +175,40 @@ def read_chain(
         Link at the beginning of the chain. Default: the root link.
     locked_joints : tuple of (str, float), optional
         Joints held at a position, rad or m.
+    workpiece_frame : str, optional
+        Link in whose frame the paths are given; the chain then begins there, and goes through the joints that carry it.
 
     Raises
     ------
     UrdfError
-        The text is broken, the chain has an unsupported joint, or the inertia of a moving link is not physical.
+        The text is broken, `base_frame` is given with `workpiece_frame`, the chain has an unsupported joint, or the
+        inertia of a moving link is not physical.
     UnknownNameError
         A frame or joint does not exist.
     """
     positions = dict(locked_joints)
     tree = read_tree(text, where)
-    for key, frame in (("tool_frame", tool_frame), ("base_frame", base_frame)):
+    frames = {
+        "tool_frame": tool_frame,
+        "base_frame": base_frame,
+        "workpiece_frame": workpiece_frame,
+    }
+    for key, frame in frames.items():
         if frame is not None:
             check_names("frame", [frame], tree.links, f"{where}: {key}")
+    world = tree.root
+    carrying: list[str] = []
+    if workpiece_frame is not None:
+        if base_frame is not None:
+            raise UrdfError(
+                "a chain to a workpiece has no base frame",
+                where=f"{where}: base_frame",
+                found=base_frame,
+                allowed="either base_frame or workpiece_frame",
+                hint="Hold joints in front of the arm with robot.locked_joints",
+            )
+        carrying = carrying_joints(tree, workpiece_frame)
+        tree = tree_seen_from(tree, workpiece_frame, where)
     leaves = _leaves(tree)
     if tool_frame is None and len(leaves) != 1:
         raise UrdfError(
@@ -210,7 +233,8 @@ def read_chain(
         )
     still = [name for name in movable if name not in chain]
     locked = _lock(tree, still, positions, where)
-    dynamics = read_dynamics(tree, chain, locked, tool)
+    carriers = sum(name in carrying for name in chain)
+    dynamics = read_dynamics(tree, chain, locked, tool, world, carriers)
     check_inertias(tree, dynamics.bodies, where)
     limits = tuple(_read_limit(tree.joints[name]) for name in chain)
     return UrdfChain(chain, limits, locked, tool, base, _plain_xml(tree), dynamics)
@@ -354,9 +378,10 @@ def _plain_xml(tree: UrdfTree) -> str:
     Pinocchio looks up joints and links by name alone, so the names of links get the prefix `LINK`.
     """
     robot = etree.Element("robot", name="robot")
-    for name, link in tree.links.items():
+    for name in dict.fromkeys([*tree.links, *tree.downward]):
         plain = etree.SubElement(robot, "link", name=LINK + name)
-        if mass_of(link):
+        link = tree.links.get(name)
+        if link is not None and mass_of(link):
             plain.extend(_copy_parts(link, "inertial"))
     kinds = {"prismatic": "prismatic", "revolute": "revolute", "continuous": "revolute"}
     for name, joint in tree.joints.items():

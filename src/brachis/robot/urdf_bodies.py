@@ -16,7 +16,9 @@ from brachis.task import Placement
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Body(Summary):
-    """The body that one joint of a chain moves: the joint's child link and all links that are fixed to this link.
+    """The body that one joint of a chain moves: a link and all links that are fixed to it.
+
+    A joint that carries the workpiece moves, in the world, the body before it in the chain.
 
     Attributes
     ----------
@@ -32,7 +34,7 @@ class Body(Summary):
     mass : float
         kg.
     com : (3,) ndarray
-        Centre of mass in the frame of the joint's child link, m; zeros if the mass is zero.
+        Centre of mass in the frame of the body's first link, m; zeros if the mass is zero.
     inertia : (3, 3) ndarray
         Inertia about the centre of mass, along the axes of the same frame, kg m^2.
     """
@@ -61,14 +63,20 @@ class UrdfDynamics(Summary):
         ``viscous``: damping, Nm s/rad or N s/m. ``coulomb``: friction, Nm or N. ``armature``: kg m^2 or kg, written
         only by `write_urdf`. Zero if not stated.
     links : dict of str to tuple of int and (4, 4) ndarray
-        For every link, the number of the joint that moves it, counted from 1, and the link's placement in the joint's
-        frame. For a link that does not move: 0, and its placement in the root link.
+        For every link, the number of the joint before it in the chain, counted from 1, and the link's placement in the
+        joint's frame. For a link before all joints: 0, and its placement in the first link of the chain.
+    root : str
+        Link that is fixed in the world: the root link of the URDF.
+    carriers : int
+        Number of joints, the first ones, that carry the workpiece; see `brachis.robot.workpiece`.
     """
 
     bodies: tuple[Body, ...]
     tool: np.ndarray
     friction: dict[str, np.ndarray]
     links: dict[str, tuple[int, np.ndarray]]
+    root: str
+    carriers: int
 
     @property
     def without_mass(self) -> tuple[Body, ...]:
@@ -77,7 +85,12 @@ class UrdfDynamics(Summary):
 
 
 def read_dynamics(
-    tree: UrdfTree, chain: Sequence[str], locked: Mapping[str, float], tool: str
+    tree: UrdfTree,
+    chain: Sequence[str],
+    locked: Mapping[str, float],
+    tool: str,
+    world: str | None = None,
+    carriers: int = 0,
 ) -> UrdfDynamics:
     """Read a chain of a checked URDF, and sum up the inertias of the links that each joint moves.
 
@@ -91,6 +104,10 @@ def read_dynamics(
         Positions of the other joints, rad or m.
     tool : str
         Link at the end of the chain.
+    world : str, optional
+        Link that is fixed in the world. Default: the root of the tree.
+    carriers : int, optional
+        Number of joints that carry the workpiece.
     """
     carried = {tree.root: (0, np.eye(4))}  # see UrdfDynamics.links
     befores = {}  # placements of joints of the chain
@@ -108,7 +125,12 @@ def read_dynamics(
     in_order = {link: carried[link] for link in tree.links}
     bodies = []
     for i, name in enumerate(chain, 1):
-        links = {link: placed for link, (body, placed) in in_order.items() if body == i}
+        moved = i if i > carriers else i - 1
+        links = {
+            link: placed
+            for link, (number, placed) in in_order.items()
+            if number == moved
+        }
         bodies.append(_read_body(tree, name, befores[name], links))
     friction = {
         kind: np.array(
@@ -120,7 +142,14 @@ def read_dynamics(
             ("armature", "armature"),
         )
     }
-    return UrdfDynamics(tuple(bodies), carried[tool][1], friction, in_order)
+    return UrdfDynamics(
+        tuple(bodies),
+        carried[tool][1],
+        friction,
+        in_order,
+        world or tree.root,
+        carriers,
+    )
 
 
 def _read_body(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
@@ -81,7 +81,7 @@ def read_tree(text: str, where: str) -> UrdfTree:
                 allowed=", ".join(_JOINT_TYPES),
                 hint=suggest(kind, _JOINT_TYPES),
             )
-    above, downward = _connect(links, joints, where)
+    above, downward = connect(links, joints, where)
     for kind, owners in (("link", links), ("joint", joints)):
         for owner in owners.values():
             for entry in ENTRIES[kind]:
@@ -171,10 +171,16 @@ def _by_name(robot: Element, kind: str, where: str) -> dict[str, Element]:
     return named
 
 
-def _connect(
-    links: Mapping[str, Element], joints: Mapping[str, Element], where: str
+def connect(
+    links: Collection[str], joints: Mapping[str, Element], where: str
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the joint above each link except the root; and all links, each after its parent."""
+    """Return the joint above each link except the root; and all links, each after its parent.
+
+    Raises
+    ------
+    UrdfError
+        A joint's link does not exist, or the links do not form one tree.
+    """
     above: dict[str, str] = {}
     below: dict[str, list[str]] = {name: [] for name in links}
     flaws = []
@@ -202,7 +208,7 @@ def _connect(
     if not flaws:
         for link in downward:  # the list grows during the loop
             downward.extend(below[link])
-        looped = links.keys() - set(downward)
+        looped = set(links) - set(downward)
         if looped:
             names = ", ".join(name for name in links if name in looped)
             flaws.append(f"a loop of links: {names}")

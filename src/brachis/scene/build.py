@@ -57,7 +57,7 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     for body in task.scene:
         frame = placement_matrix(place_frame(task.frames, body.frame))
         solids += build_solids(body, frame)
-    mounted = placement_matrix(robot.settings.mounting)
+    base = placement_matrix(robot.settings.base_placement)
     hint = (
         "Leave out bodies that the robot cannot reach, or join small bodies in one mesh"
     )
@@ -67,12 +67,14 @@ def scene_of(robot: Robot, task: Task) -> Scene | None:
     placements = np.array([solid.placement for solid in solids])
     for number, solid in enumerate(solids):
         if solid.link is None:
+            joints[number], world = robot.world
+            placements[number] = world @ placements[number]
             continue
         check_names("link", [solid.link], tree.links, f"scene: {solid.name}.link")
         joints[number], placed = robot.urdf_dynamics.links[solid.link]
         placements[number] = placed @ solid.placement
-        if not joints[number]:  # it is placed in the root link
-            placements[number] = mounted @ placements[number]
+        if not joints[number]:  # it is placed in the first link
+            placements[number] = base @ placements[number]
     listed = itertools.chain(*settings.disable)
     known = sorted({*tree.links, *(solid.name for solid in solids)})
     check_names("link or body", listed, known, "collisions.disable")

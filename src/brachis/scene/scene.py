@@ -110,13 +110,15 @@ class Scene:
         first, second = self.pairs.T
         apart = np.linalg.norm(centres[:, first] - centres[:, second], axis=2)
         half_spaces = np.flatnonzero(np.isinf(radii))
+        turned, origins = self._place(placed) if len(half_spaces) else placed
         radii = np.where(np.isinf(radii), 0.0, radii)
         bounds = apart - radii[first] - radii[second]
         for number in half_spaces:
             plane = self.solids[number].geometry
             for mine, partner in ((first, second), (second, first)):
                 plane_pairs = np.flatnonzero(mine == number)
-                height = centres[:, partner[plane_pairs]] @ plane.n - plane.d
+                away = centres[:, partner[plane_pairs]] - origins[:, number, None]
+                height = away @ turned[:, number] @ plane.n - plane.d
                 bounds[:, plane_pairs] = height - radii[partner[plane_pairs]]
         return bounds
 

@@ -330,7 +330,11 @@ def explain_no_motion(
         f"no motion within the limits was found{along}: {outcomes or 'no initial guess'}",
         hint=advice + hint_end,
     )
-    remedies = [speed.lower_to(0.7 * speed.figure) for speed in speeds_of(problem)]
+    remedies = [
+        speed.lower_to(0.7 * speed.figure)
+        for part in problem.parts
+        for speed in speeds_of(part)
+    ]
     return error.with_remedies(*remedies)
 
 

@@ -251,8 +251,8 @@ def widen_plan(planned: Planned, problem: Problem) -> Planned:
 def narrow_motion(motion: Trajectory) -> Trajectory:
     """Undo `widen_plan`: return the motion of the simpler task for which it is optimal.
 
-    A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged, and so is
-    the motion of a program.
+    A motion that has curves for idle joints, or for the virtual joints of tolerances, is returned unchanged. So is the
+    motion of a program.
     """
     if motion.components:
         return motion

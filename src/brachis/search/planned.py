@@ -13,13 +13,12 @@ from brachis.common.summary import Summary
 from brachis.common.threads import use_one_thread
 from brachis.explain import Sensitivities, explain_motion
 from brachis.optimise.backends import SolverReport
-from brachis.robot.from_task import in_use
 from brachis.robot.plausibility import Issue
 from brachis.search.least_motion import LeastMotion
 from brachis.search.stages import Candidate, FinishedCandidate
 from brachis.task import FitReport, Task
 from brachis.timing import TimingGap
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Samples, Trajectory, settings_in_use
 from brachis.trajectory.sensitivities import Gradient
 from brachis.verify import Verification
 
@@ -36,6 +35,8 @@ def describe_motion(
         "redundant_joints": list(trajectory.redundant_joints),
         "branch": trajectory.branch,
         "phases": [phase.to_dict() for phase in trajectory.phases],
+        "parts": [part.to_dict() for part in trajectory.parts],
+        "events": [asdict(event) for event in trajectory.events],
         "joint_names": list(trajectory.joint_names),
         "verified": verification.passed,
         "worst_ratio": verification.worst_ratio,
@@ -130,6 +131,13 @@ class PlannedMotion(Summary):
         return self.task.fits
 
     @property
+    def smoothing(self) -> str:
+        """The outcome of the search for the smoothest motion, in words."""
+        if self.least_motion is not None:
+            return self.least_motion.status
+        return "not for programs" if self.trajectory.parts else "off"
+
+    @property
     def solver_report(self) -> SolverReport:
         """The report of the solve that gave the trajectory."""
         return self.candidate.reports[-1]
@@ -146,7 +154,7 @@ class PlannedMotion(Summary):
             "end_posture": end,
             "position_units": list(trajectory.robot.position_units),
             "family": self.family,
-            "in_use": in_use(trajectory.robot, trajectory.node_accelerations),
+            "in_use": settings_in_use(trajectory),
             "status": report.status.name.lower(),
             "advice": report.status.value,
             "solver": report.solver,

@@ -5,8 +5,7 @@
 3. In the order of these times, candidates are solved over time, refined and verified, as long as they may beat the best
    verified one. Refinement slows all motions by about the same amount. So a motion that does not beat the best one
    before refinement is not refined.
-4. If there is little time, a motion close to a joint path is found before anything else. If nothing is verified towards
-   the end of the time, such a motion is found then (see `first_motion`).
+4. If there is little time, or nothing is verified towards its end, a motion near a joint path is found first.
 5. Other solvers, closed forms of single choices and numeric guesses are tried only while nothing is verified.
 
 The outcome does not depend on the number of processes: work that one process would not have done is discarded.
@@ -166,8 +165,8 @@ class Search:
         PlanningError
             A given speed, or a limit on the mean of a load, is far out of reach.
         """
-        guess_batches = self._find_guesses(motion, exact)
-        for batch in itertools.islice(guess_batches, max_batches):
+        found = self._find_guesses(motion, exact)
+        for batch in itertools.islice(found, max_batches):
             if self._deadline.left < LITTLE_TIME and not self._ranked:
                 soon = self._deadline.part(_FIRST_SHARE)
                 self._find_first_motion(batch.guesses, soon)
@@ -199,8 +198,9 @@ class Search:
         if self.is_satisfied and self.best is not exact and not goes_on:
             return
         is_first_fallback = True
-        where = (self._problem, self._decompositions)
-        for batch in find_batches(*where, self._latest, self._listener):
+        for batch in find_batches(
+            self._problem, self._decompositions, self._latest, self._listener
+        ):
             for decomposition, dead_end in batch.lattices:
                 self._add_lattice(decomposition, dead_end)
             if batch.fallback and self.is_satisfied:
@@ -327,14 +327,13 @@ class Search:
         """Return the error that tells why no motion was found."""
         guesses = [alone for guess in self.guesses for alone in guess.alone]
         failure = explain_holding(guesses) or explain_postures(guesses)
-        if not self.interrupted:
-            failure = failure or explain_speeds(guesses, are_tried=True)
+        if failure is None and not self.interrupted:
+            failure = explain_speeds(guesses, are_tried=True)
         if failure is not None:
             return failure
         # The time limit of the search may have ended every solve before the solve's own time limit.
-        last = [
-            candidate.reports[-1] for candidate in self.candidates if candidate.reports
-        ]
+        tried = filter(None, (candidate.reports for candidate in self.candidates))
+        last = [reports[-1] for reports in tried]
         self.interrupted |= bool(last) and all(
             report.status is SolveStatus.TIME_LIMIT
             and report.wall_time < self._problem.task.solver.time_limit

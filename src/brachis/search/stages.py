@@ -301,11 +301,22 @@ def facts_of(candidate: Candidate) -> dict[str, Any]:
     return {name: getattr(candidate, name) for name in names}
 
 
+def name_coordinates(maps: Sequence[JointMap]) -> dict[str, Any]:
+    """Name the redundant joints and the branches of joint maps; those of moves only if nothing else is planned."""
+    chosen = [joint_map for joint_map in maps if not joint_map.is_move] or maps[:1]
+    names = (name for joint_map in chosen for name in joint_map.redundant_joints)
+    branches = dict.fromkeys(joint_map.branch_label for joint_map in chosen)
+    return {
+        "redundant_joints": tuple(dict.fromkeys(names)),
+        "branch": "; ".join(branches),
+    }
+
+
 def begin_candidate(guess: InitialGuess, status: str) -> Candidate:
     """Return a candidate for an initial guess."""
+    parts = guess.parts if isinstance(guess, ChainGuess) else (guess,)
     return Candidate(
-        redundant_joints=guess.joint_map.redundant_joints,
-        branch=guess.joint_map.branch_label,
+        **name_coordinates([part.joint_map for part in parts]),
         origin=guess.origin,
         solver=guess.solver,
         estimate=guess.estimate,

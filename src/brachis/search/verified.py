@@ -19,6 +19,7 @@ from brachis.search.stages import (
     FinishedCandidate,
     RankedCandidate,
     facts_of,
+    name_coordinates,
 )
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification, verify_trajectory
@@ -94,11 +95,10 @@ def verify(
         with contextlib.suppress(UnreachableError):
             trajectory = motion or extract_motion(problem, refined.program, refined.x)
             verification = verify_trajectory(trajectory, own_limits=problem.own_limits)
-    joint_map = refined.program.phases[0].joint_map
+    maps = [phase.joint_map for phase in refined.program.phases]
     tolerance = problem.task.refinement.tolerance
     known = facts_of(candidate) | {
-        "redundant_joints": joint_map.redundant_joints,
-        "branch": joint_map.branch_label,
+        **name_coordinates(maps),
         "status": _in_words(refined, verification, tolerance),
         "reports": (*before, *refined.reports),
     }

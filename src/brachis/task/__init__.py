@@ -38,6 +38,7 @@ from brachis.task.program import (
     PayloadPart,
     RetractPart,
     name_of,
+    part_names,
     path_keys,
     scene_during,
 )
@@ -107,6 +108,7 @@ __all__ = [
     "load_task",
     "name_of",
     "name_task_file",
+    "part_names",
     "path_keys",
     "read_assignment",
     "read_limits",

@@ -41,6 +41,7 @@ class RobotKeywords(TypedDict, total=False):
     tool_frame: str | None
     tool_offset: Placement | Settings | Transform | None
     base_frame: str | None
+    workpiece_frame: str | None
     mounting: Placement | Settings | Transform | Literal["floor", "wall", "ceiling"]
     gravity: Array | Sequence[float]
     locked_joints: Mapping[str, float] | None

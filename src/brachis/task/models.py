@@ -414,7 +414,9 @@ class Task(CheckedModel):
     @property
     def fits(self) -> tuple[FitReport, ...]:
         """Reports on the fits to points, one for each file or array of points in the path."""
-        fits = (getattr(segment.shape, "fit", None) for segment in self.path)
+        paths = [self.path, *(getattr(part, "path", ()) for part in self.program)]
+        segments = (segment for path in paths for segment in path)
+        fits = (getattr(segment.shape, "fit", None) for segment in segments)
         return tuple(fit for fit in fits if fit is not None)
 
     def to_dict(self) -> dict[str, Any]:

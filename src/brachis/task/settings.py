@@ -218,6 +218,9 @@ class RobotSettings(Model):
     """Placement of the frame that follows the path, relative to tool_frame: {xyz: ..., rpy_deg: ...}."""
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
+    workpiece_frame: Name | None = None
+    """Link that carries the workpiece, such as a positioner's table, in whose frame paths are given. Null: the world
+    frame."""
     mounting: Mounting = Field(default_factory=Placement)
     """Placement of the root link of the URDF in the world: floor, wall (z along the world's x axis), ceiling (upside
     down, turned about x), or {xyz: ..., rpy_deg: ...}."""
@@ -236,6 +239,18 @@ class RobotSettings(Model):
     these lower limits, not played more slowly."""
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     """Drive inertia and friction."""
+
+    @property
+    def base_placement(self) -> Placement:
+        """Placement of the chain's first link in the frame of the paths: there is none in the workpiece frame."""
+        return self.mounting if self.workpiece_frame is None else Placement()
+
+    def without_defaults(self) -> RobotSettings:
+        """Return the settings without those that have their default value, so that these can be set later."""
+        default = RobotSettings()
+        return RobotSettings(
+            **{key: value for key, value in self if value != getattr(default, key)}
+        )
 
 
 _VANISHING: Final = {"velocity": 1, "full": 2, "jerk": 3}

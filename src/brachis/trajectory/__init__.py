@@ -8,19 +8,28 @@ from brachis.trajectory.phases import (
     phase_rows,
 )
 from brachis.trajectory.pieces import Pieces
-from brachis.trajectory.program import Event, MotionPart
+from brachis.trajectory.program import (
+    PART_COLUMNS,
+    Event,
+    MotionPart,
+    part_rows,
+    torques_of,
+)
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.samples import Samples
-from brachis.trajectory.trajectory import (
-    CONTINUOUS_TORQUE,
+from brachis.trajectory.source import (
     MotionSource,
-    Trajectory,
+    change_robots,
     motion_of,
     of_motion,
+    phase_table,
+    settings_in_use,
 )
+from brachis.trajectory.trajectory import CONTINUOUS_TORQUE, Trajectory
 
 __all__ = [
     "CONTINUOUS_TORQUE",
+    "PART_COLUMNS",
     "PHASE_COLUMNS",
     "Event",
     "MotionPart",
@@ -31,8 +40,13 @@ __all__ = [
     "Recovered",
     "Samples",
     "Trajectory",
+    "change_robots",
     "join_splines",
     "motion_of",
     "of_motion",
+    "part_rows",
     "phase_rows",
+    "phase_table",
+    "settings_in_use",
+    "torques_of",
 ]

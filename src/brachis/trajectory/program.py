@@ -1,9 +1,14 @@
-"""The parts of the motion of a program."""
+"""The parts and events of the motion of a program."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+
+from brachis.robot import Robot, dynamics
 
 
 @dataclass(frozen=True)
@@ -47,3 +52,40 @@ class Event:
 
     name: str
     time: float
+
+    def __str__(self) -> str:
+        """Return the name and the time."""
+        return f"{self.name} at {self.time:.4f} s"
+
+
+PART_COLUMNS = ("part", "kind", "time", "share")
+"""Headings of the columns of `part_rows`."""
+
+
+def part_rows(parts: Sequence[MotionPart]) -> list[tuple[str, ...]]:
+    """Write parts as rows of a table, with units and with their shares of the time of the motion."""
+    rows: list[tuple[str, ...]] = []
+    for part in parts:
+        time = f"{part.duration:.4f} s ({part.begin:.4f} to {part.end:.4f} s)"
+        share = f"{100.0 * part.duration / parts[-1].end:.1f} %"
+        rows.append((part.name, part.kind, time, share))
+    return rows
+
+
+def torques_of(robot: Robot, *states: np.ndarray) -> np.ndarray:
+    """Return the torques of q, qdot and qddot, (K, n), of a robot's first n joints; the others are virtual."""
+    count = states[0].shape[1]
+    virtual = ((0, 0), (0, robot.n - count))
+    wider = (np.pad(values, virtual) for values in states)
+    return dynamics.torque(robot, *wider)[:, :count]
+
+
+def summarise_program(
+    parts: Sequence[MotionPart], events: Sequence[Event]
+) -> dict[str, str]:
+    """Return the names of the parts, and the events, for the summary of a motion."""
+    shown = {
+        "parts": ", ".join(part.name for part in parts),
+        "events": ", ".join(map(str, events)),
+    }
+    return {name: text for name, text in shown.items() if text}

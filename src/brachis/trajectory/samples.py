@@ -36,11 +36,11 @@ class Samples(Summary):
     tau : (K, n) ndarray or None
         Joint torques (Nm or N); None if the URDF has no masses.
     tool_position : (K, 3) ndarray
-        Position of the tool frame in the world, m.
+        Position of the tool frame in the frame of the paths, m: in the world, or in the robot's workpiece frame.
     tool_quaternion : (K, 4) ndarray
         Orientation of the tool frame, w, x, y, z, with signs chosen so that successive quaternions are close.
     tool_speed : (K,) ndarray
-        Speed of the tool frame's origin, m/s.
+        Speed of the tool frame's origin in the frame of the paths, m/s.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class Samples(Summary):
 def tool_motion(
     robot: Robot, q: np.ndarray, qdot: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pose and the speed of the tool frame in the world. Virtual joints do not move this frame.
+    """Return the pose and the speed of the tool frame in the frame of the paths. Virtual joints do not move it.
 
     Parameters
     ----------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from functools import cached_property, wraps
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,11 +21,17 @@ from brachis.common.summary import Summary
 from brachis.common.words import write_apart, write_count
 from brachis.errors import InputError, UnknownNameError
 from brachis.kernel import Spline
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
+from brachis.robot.task_map.choice import FREE
 from brachis.task import Task
 from brachis.trajectory.phases import MotionPhase, PhaseSpline, find_phase_knots
 from brachis.trajectory.pieces import Pieces, piece_coefficients
-from brachis.trajectory.program import Event, MotionPart
+from brachis.trajectory.program import (
+    Event,
+    MotionPart,
+    summarise_program,
+    torques_of,
+)
 from brachis.trajectory.recovered import Recovered
 from brachis.trajectory.result_file import ARRAYS, read_result, write_result
 from brachis.trajectory.samples import Samples, tool_motion
@@ -89,8 +95,7 @@ class Trajectory(Summary):
     events : tuple of Event
         The events of a program, in the order of their times.
     components : tuple of (float, Trajectory)
-        The motions of which the motion of a program consists, each with the time at which it begins, s. Each has its
-        own task.
+        The motions that make up the motion of a program, each with its own task and the time at which it begins, s.
 
     Examples
     --------
@@ -146,6 +151,12 @@ class Trajectory(Summary):
     @property
     def redundancy(self) -> str:
         """The redundant joints in words or, for a chart, the number of its coordinates of the self-motion."""
+        if self.components:
+            paths = (
+                part for _, part in self.components if part.task.task_space != FREE
+            )
+            names = dict.fromkeys(path.redundancy for path in paths)
+            return "; ".join(names) or "none"
         if self.redundant_joints or not self.chart_rows.size:
             return ", ".join(self.redundant_joints) or "none"
         return (
@@ -227,7 +238,19 @@ class Trajectory(Summary):
             )
             kind = next(matching, (None, is_dwell))
             phases.append(MotionPhase(begin, end, *s, *kind))
+        if self.components:
+            phases = [self._with_given_speed(phase) for phase in phases]
         return tuple(phases)
+
+    def _with_given_speed(self, phase: MotionPhase) -> MotionPhase:
+        """Return a phase of a program with the speed that is given in its component."""
+        if phase.is_dwell:
+            return phase
+        middle = np.array([0.5 * (phase.begin + phase.end)])
+        pieces = self.split_times(middle)
+        component, time = next((part, t[0]) for part, _, t in pieces if len(t))
+        inner = next(phase for phase in component.phases if phase.end >= time)
+        return replace(phase, speed=inner.speed, leads=inner.leads)
 
     def path_coordinate(self, t: ArrayLike) -> np.ndarray:
         """Return the path coordinate s at times `t`, in the same shape."""
@@ -261,8 +284,9 @@ class Trajectory(Summary):
 
     def torque(self, t: ArrayLike) -> np.ndarray:
         """Return joint torques, Nm or N, in the shape of `position`; UrdfError if the URDF has no masses."""
-        motion = self.at(t)
-        tau = dynamics.torque(self.robot, motion.q, motion.qdot, motion.qddot)
+        self.robot.check_masses("torques")
+        tau = self.at(t).tau
+        assert tau is not None
         return tau if np.ndim(t) else tau[0]
 
     def at(self, t: ArrayLike) -> Samples:
@@ -281,9 +305,31 @@ class Trajectory(Summary):
             qdot[-1] = 0.0
             qddot[-1] = 0.0
         robot = self.robot
-        tau = dynamics.torque(robot, q, qdot, qddot) if robot.has_masses else None
+        tau = self._torques(within, q, qdot, qddot) if robot.has_masses else None
         tool = tool_motion(self.robot, q, qdot)
         return Samples(t, self.path_coordinate(within), q, qdot, qddot, tau, *tool)
+
+    def _torques(self, t: np.ndarray, *states: np.ndarray) -> np.ndarray:
+        """Return the torques of q, qdot and qddot, (K, n), with the payloads that the robot has at times t."""
+        tau = np.empty_like(states[0])
+        for component, rows, _ in self.split_times(t):
+            tau[rows] = torques_of(component.robot, *(state[rows] for state in states))
+        return tau
+
+    def split_times(
+        self, t: np.ndarray
+    ) -> Iterator[tuple[Trajectory, np.ndarray, np.ndarray]]:
+        """Yield the components, each with the indices of its times, (k,), and these times from its start, s.
+
+        A motion without components is its only one. A time at which two meet belongs to the later one. While the arm
+        waits after a component, the time is that of its end.
+        """
+        components = self.components or ((0.0, self),)
+        begins = [begin for begin, _ in components]
+        numbers = np.searchsorted(begins[1:], t, side="right")
+        for place, (begin, component) in enumerate(components):
+            (rows,) = np.nonzero(numbers == place)
+            yield component, rows, np.clip(t[rows] - begin, 0.0, component.t_end)
 
     def sample(self, dt: float, *, last: str = "exact") -> Samples:
         """Sample the motion at a controller's rate.
@@ -350,18 +396,19 @@ class Trajectory(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries shown to the user."""
-        source = Path(self.robot.source)
+        no_branch = len(self.chart_rows) or self.components
         intervals = write_count(len(np.unique(self.knots)) - 1, "interval")
         return {
             "end time": f"{self.t_end:.4f} s",
-            "robot": Path(*source.parts[-2:]).as_posix(),
+            "robot": Path(*Path(self.robot.source).parts[-2:]).as_posix(),
             "joints": ", ".join(self.joint_names),
             "redundant joints": self.redundancy,
-            **({} if len(self.chart_rows) else {"branch": self.branch or "none"}),
+            **({} if no_branch else {"branch": self.branch or "none"}),
             "start posture": self.robot.in_words(self.q[0]),
             "end posture": self.robot.in_words(self.q[-1]),
             **({"recovered from": self.recovered.source} if self.recovered else {}),
             "splines": f"degree {self.degree}, {intervals}",
+            **summarise_program(self.parts, self.events),
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -435,56 +482,3 @@ class Trajectory(Summary):
                 allowed=f"0 s to {t_end} s",
             )
         return inside
-
-
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
-
-
-class HasMotion(Protocol):
-    """An object with a trajectory, such as the result of a plan."""
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """Return the trajectory."""
-
-
-MotionSource = Trajectory | HasMotion | str | os.PathLike[str]
-
-
-def motion_of(source: MotionSource, where: str = "trajectory") -> Trajectory:
-    """Return the trajectory of `source`; `where` is the argument's name for messages.
-
-    Raises
-    ------
-    ResultFileError
-        The file is not a result file.
-    InputError
-        `source` is not a trajectory, a result or a file.
-    """
-    if isinstance(source, Trajectory):
-        return source
-    if isinstance(source, str | os.PathLike):
-        return Trajectory.load(source)
-    motion = getattr(source, "trajectory", None)
-    if not isinstance(motion, Trajectory):
-        raise InputError(
-            "this is not a motion",
-            where=where,
-            found=type(source).__name__,
-            allowed="a Trajectory, a Result, or the npz file of either",
-        )
-    return motion
-
-
-def of_motion(
-    function: Callable[Concatenate[Trajectory, _P], _R],
-) -> Callable[Concatenate[MotionSource, _P], _R]:
-    """Let a function of a trajectory accept everything that `motion_of` accepts."""
-
-    @wraps(function)
-    def taking(trajectory: MotionSource, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        """Call the function with the trajectory of the given source."""
-        return function(motion_of(trajectory), *args, **kwargs)
-
-    return taking  # type: ignore[return-value]  # mypy fears a second `trajectory` among the keywords

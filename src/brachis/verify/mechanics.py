@@ -14,6 +14,9 @@ the moment, or force, along z, and
 
     armature qddot + viscous qdot + coulomb tanh(qdot / v_eps).
 
+A chain that begins at a workpiece has the world in its middle. The recursion begins there: outwards to the tool as
+above, and by the inverse equations to the workpiece, whose carriers hold the bodies between them and the workpiece.
+
 The rate of the torque is computed by finite differences along the motion, but for the last three terms by their
 derivatives.
 """
@@ -68,12 +71,12 @@ def real_tool_placements(
 
 
 def joint_placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the world and all joints.
+    """Return rotations, (K, n + 1, 3, 3), and origins, (K, n + 1, 3), m, of the frame of the paths and all joints.
 
     The postures q are (K, n). Virtual joints of the tool are ignored.
     """
     bodies = robot.urdf_dynamics.bodies
-    base = placement_matrix(robot.settings.mounting)
+    base = placement_matrix(robot.settings.base_placement)
     rotation = np.broadcast_to(np.eye(3), (len(q), 3, 3))
     origin = np.zeros((len(q), 3))
     rotations = [rotation]
@@ -128,20 +131,18 @@ def _rigid(
     """Return torques (K, n) without armature and friction."""
     tau = np.zeros_like(q)
     bodies = robot.urdf_dynamics.bodies
-    base = placement_matrix(robot.settings.mounting)[:3, :3]
-    upwards = base.T @ -np.array(robot.model.gravity.linear)
-    motions = _motions(robot, q, qdot, qddot, upwards)
+    carriers = robot.urdf_dynamics.carriers
+    base = placement_matrix(robot.settings.base_placement)[:3, :3]
+    world = base.T @ robot.world[1][:3, :3]
+    upwards = world @ -np.array(robot.model.gravity.linear)
+    motions = _motions(robot, (q, qdot, qddot), upwards, carriers)
     force = moment = np.zeros((3, len(q)))
-    for joint in reversed(range(len(bodies))):
+    for joint in reversed(range(carriers, len(bodies))):
         body = bodies[joint]
-        omega, alpha, acceleration = motions[joint]
         for carried in _carried_bodies(robot, joint):
-            com = carried.com[:, None]
-            body_force = carried.mass * _accelerate(com, omega, alpha, acceleration)
-            momentum = carried.inertia @ omega
-            body_moment = carried.inertia @ alpha + cross(omega, momentum)
+            body_force, body_moment = _accelerating_wrench(carried, motions[joint])
             force = force + body_force
-            moment = moment + (body_moment + cross(com, body_force))
+            moment = moment + body_moment
         tau[:, joint] = body.axis @ (force if body.sliding else moment)
         position = q[:, joint]
         if body.sliding:
@@ -152,7 +153,86 @@ def _rigid(
         rotation = body.placement[:3, :3]
         force = rotation @ force
         moment = rotation @ moment + cross(body.placement[:3, 3, None], force)
+    _add_carriers(robot, (q, qdot, qddot), upwards, tau)
     return tau
+
+
+def _accelerating_wrench(
+    body: Body, motion: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return force and moment about the frame's origin, (3, K) each, of a body whose frame has omega, alpha and a."""
+    omega, alpha, acceleration = motion
+    com = body.com[:, None]
+    force = body.mass * _accelerate(com, omega, alpha, acceleration)
+    momentum = body.inertia @ omega
+    moment = body.inertia @ alpha + cross(omega, momentum)
+    return force, moment + cross(com, force)
+
+
+def _add_carriers(
+    robot: Robot,
+    states: tuple[np.ndarray, np.ndarray, np.ndarray],
+    upwards: np.ndarray,
+    tau: np.ndarray,
+) -> None:
+    """Write the torques of the joints that carry the workpiece into `tau`, (K, n)."""
+    bodies = robot.urdf_dynamics.bodies[: robot.urdf_dynamics.carriers]
+    q = states[0]
+    motions = _carrier_motions(robot, states, upwards)
+    force = moment = np.zeros((3, len(q)))
+    for joint, body in enumerate(bodies):
+        body_force, body_moment = _accelerating_wrench(body, motions[joint])
+        rotation = body.placement[:3, :3].T
+        moment = moment + body_moment
+        force = force + body_force
+        moment = rotation @ (moment - cross(body.placement[:3, 3, None], force))
+        force = rotation @ force
+        tau[:, joint] = -body.axis @ (force if body.sliding else moment)
+        position = q[:, joint]
+        if body.sliding:
+            moment = moment - cross(body.axis[:, None] * position, force)
+        else:
+            force = _rotate(body.axis, -position, force)
+            moment = _rotate(body.axis, -position, moment)
+
+
+def _carrier_motions(
+    robot: Robot,
+    states: tuple[np.ndarray, np.ndarray, np.ndarray],
+    upwards: np.ndarray,
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Compute omega, alpha and a, (3, K) each, of the bodies from the workpiece to the world.
+
+    These are the equations of `_motions`, solved for the frame before each joint.
+    """
+    q, qdot, qddot = states
+    omega = alpha = np.zeros((3, len(q)))
+    acceleration = np.tile(upwards[:, None], len(q))
+    motions = []
+    for joint in reversed(range(robot.urdf_dynamics.carriers)):
+        body = robot.urdf_dynamics.bodies[joint]
+        axis = body.axis[:, None]
+        velocity = axis * qdot[:, joint]
+        joint_acceleration = axis * qddot[:, joint]
+        if body.sliding:
+            coriolis = 2.0 * cross(omega, velocity)
+            acceleration = acceleration - coriolis - joint_acceleration
+            back = -axis * q[:, joint]
+            acceleration = _accelerate(back, omega, alpha, acceleration)
+        else:
+            omega = omega - velocity
+            alpha = alpha - joint_acceleration - cross(omega, velocity)
+            omega, alpha, acceleration = (
+                _rotate(body.axis, q[:, joint], vectors)
+                for vectors in (omega, alpha, acceleration)
+            )
+        back = -body.placement[:3, :3].T @ body.placement[:3, 3]
+        acceleration = _accelerate(back[:, None], omega, alpha, acceleration)
+        omega, alpha, acceleration = (
+            body.placement[:3, :3] @ vectors for vectors in (omega, alpha, acceleration)
+        )
+        motions.append((omega, alpha, acceleration))
+    return motions[::-1]
 
 
 def tool_accelerations(
@@ -163,26 +243,26 @@ def tool_accelerations(
     Virtual joints do not move the tool. If qdot is zero, accelerations depend on qddot as velocities depend on qdot. To
     get the velocities, pass zeros as qdot, and qdot as qddot.
     """
-    motion = _motions(robot, q, qdot, qddot, np.zeros(3))[-1]
+    motion = _motions(robot, (q, qdot, qddot), np.zeros(3))[-1]
     tool = robot.urdf_dynamics.tool @ placement_matrix(robot.settings.tool_offset)
     return _accelerate(tool[:3, 3, None], *motion), motion[1]
 
 
 def _motions(
     robot: Robot,
-    q: np.ndarray,
-    qdot: np.ndarray,
-    qddot: np.ndarray,
+    states: tuple[np.ndarray, np.ndarray, np.ndarray],
     base_acceleration: np.ndarray,
+    first: int = 0,
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Compute omega, alpha and the acceleration of every joint's frame, (3, K) each.
+    """Compute omega, alpha and the acceleration of the joints' frames, (3, K) each, from the joint `first` on.
 
-    `base_acceleration`, (3,), is in the axes of the base.
+    The list has an entry for every joint. `base_acceleration`, (3,), is in the axes of the body before joint `first`.
     """
+    q, qdot, qddot = states
     omega = alpha = np.zeros((3, len(q)))
     acceleration = np.tile(base_acceleration[:, None], len(q))
-    motions = []
-    for joint, body in enumerate(robot.urdf_dynamics.bodies):
+    motions = [(omega, alpha, acceleration)] * first
+    for joint, body in enumerate(robot.urdf_dynamics.bodies[first:], first):
         axis = body.axis[:, None]
         offset = body.placement[:3, 3, None]
         rotation = body.placement[:3, :3].T

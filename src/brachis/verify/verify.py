@@ -54,7 +54,7 @@ def verify_trajectory(
         Tolerances. By default, limits may be exceeded by the task's ``refinement.tolerance``.
     robot : Robot, optional
         Robot to use instead of the saved one, for example from a newer URDF. Its joints must have the same names in the
-        same order.
+        same order. For a program, its differences from the saved robot hold in all parts.
     own_limits : sequence of LimitModel, optional
         The user's own limits with which the trajectory was planned, in addition to those that its task names.
 
@@ -152,12 +152,15 @@ def _verify_program(
     worst: dict[str, Check] = {}
     verified = []
     for begin, component in trajectory.components:
-        part = verify_trajectory(component, motion.options, own_limits=own_limits)
+        robot = _robot_of(component, motion)
+        part = verify_trajectory(
+            component, motion.options, robot=robot, own_limits=own_limits
+        )
         verified.append(part)
         for check in part.checks:
             before = worst.get(check.name)
             if before is None or check.share > before.share:
-                worst[check.name] = _within(trajectory, begin, check)
+                worst[check.name] = place_in_program(trajectory, begin, check)
     whole = [
         _check_components(motion),
         *check_progress(motion),
@@ -174,10 +177,28 @@ def _verify_program(
     )
 
 
-def _within(trajectory: Trajectory, begin: float, check: Check) -> Check:
+def _robot_of(component: Trajectory, motion: CheckedMotion) -> Robot:
+    """Return the robot for a component: its own, with the differences of the given robot from the saved one."""
+    given = motion.robot
+    saved = motion.trajectory.robot
+    if given.settings == saved.settings and given.urdf == saved.urdf:
+        return component.robot
+    changes = {
+        key: value
+        for key, value in given.settings
+        if value != getattr(saved.settings, key)
+    }
+    settings = component.robot.settings.model_copy(update=changes)
+    return Robot.from_settings(settings, given.source, given.urdf)
+
+
+def place_in_program(trajectory: Trajectory, begin: float, check: Check) -> Check:
     """Return a check of a component that begins at a time, s, with its time in the whole motion and its part."""
+    if not trajectory.parts:
+        return check
     time = begin + (check.time or 0.0)
-    name = next(part.name for part in trajectory.parts if part.end >= time)
+    names = (part.name for part in trajectory.parts if part.end >= time)
+    name = next(names, trajectory.parts[-1].name)
     subject = f"{check.subject}, {name}" if check.subject else name
     return replace(check, time=time, subject=subject)
 

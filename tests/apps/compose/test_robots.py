@@ -20,6 +20,7 @@ URDFS = sorted(ROBOTS.glob("*/*.urdf"))
 MADE = (
     "tx90l_rail/robot.urdf",
     "tx90l_rail/arm.urdf",
+    "tx90l_positioner/robot.urdf",
     *(f"{name}/robot.urdf" for name in ("iiwa14", "gen3", "gen3_rails", "arm8")),
     "ur10_rail/robot.urdf",
 )
@@ -48,7 +49,8 @@ def shift(x, y, z):
 
 @pytest.mark.parametrize("path", URDFS, ids=lambda path: "/".join(path.parts[-2:]))
 def test_robot_is_read_by_brachis_and_yourdfpy(path):
-    robot = Robot.from_urdf(path)
+    link = "workpiece" if path.parent.name == "tx90l_positioner" else None
+    robot = Robot.from_urdf(path, workpiece_frame=link)
     assert robot.n >= 2
     assert np.all(np.isfinite(robot.limits.torque))
     urdf = yourdfpy.URDF.load(

@@ -131,7 +131,7 @@ REFUSED = {
     "period: 4": "period: out of range; found 4; allowed: <= 0.1",
     "formats: [krl]": "no format of samples named 'krl'",
     "axes: [{joint: joint_1, zero: 90}]": "zero of an axis is more than a turn away; found 90 rad",
-    "events: {start: x}": "no event with this name",
+    "events: {process_start: x}": "no event with this name",
     "limits: {velocity: [1, 2]}": "wrong number of values; found 2; allowed: 6, for the arm; limits of external axes",
 }
 

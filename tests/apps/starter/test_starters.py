@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 import brachis
-from brachis.apps.starter import choices, placeholders, starter_task, task_text
+from brachis.apps.starter import choices, heights, placeholders, starter_task, task_text
 from brachis.errors import InputError, PlanningError, UrdfError
 from brachis.robot import bind
 from brachis.robot.limits import UrdfLimit
@@ -52,10 +52,10 @@ def test_robots_that_come_along(name, tmp_path):
     starter = starter_task(brachis.robots.path_of(name), folder=tmp_path)
     check(starter, tmp_path)
     motion = starter.result.trajectory
-    heights = starter.robot.heights(motion.position(np.linspace(0.0, motion.t_end, 20)))
-    assert heights.min() > (-1e-9 if name in ("scara3", "gantry2") else 0.05), (
-        "the tool is above the robot's base"
-    )
+    q = motion.position(np.linspace(0.0, motion.t_end, 20))
+    assert heights(starter.robot, q).min() > (
+        -1e-9 if name in ("scara3", "gantry2") else 0.05
+    ), "the tool is above the robot's base"
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_heights_are_above_the_base_wherever_it_is():
         robot = brachis.Robot.from_urdf(
             "x", urdf_text=text, tool_frame="tool", mounting=mounting
         )
-        np.testing.assert_allclose(robot.heights(q), [0.7, -0.2], atol=1e-12)
+        np.testing.assert_allclose(heights(robot, q), [0.7, -0.2], atol=1e-12)
 
 
 @pytest.mark.parametrize("file", FOREIGN)

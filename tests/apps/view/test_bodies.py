@@ -3,6 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+import brachis
 from brachis.apps.view.bodies import bodies_of, placements
 from brachis.robot import Robot
 from support.shown import ROBOTS
@@ -58,7 +59,7 @@ def test_a_robot_without_shapes_gets_a_skeleton_from_base_to_tool(
 
 @pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)
 def test_the_box_holds_every_robot(urdf, motion_of):
-    motion = motion_of(Robot.from_urdf(urdf))
+    motion = motion_of(getattr(brachis.robots, urdf.parent.name))
     bodies = bodies_of(motion)
     assert bodies.shows_links
     vertices = np.vstack(

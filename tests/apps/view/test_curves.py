@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import brachis
 from brachis.apps.view.panel import shown_panels
-from brachis.robot import Robot
 from support.motions import with_limits, with_tool_speed
 from support.shown import ROBOTS
 
@@ -43,7 +43,7 @@ def test_joints_without_limits_are_plotted_in_their_units(bare_robot, motion_of)
 
 @pytest.mark.parametrize("urdf", ROBOTS, ids=lambda path: path.parent.name)
 def test_every_robot_has_curves(urdf, motion_of):
-    motion = motion_of(Robot.from_urdf(urdf))
+    motion = motion_of(getattr(brachis.robots, urdf.parent.name))
     panels = curves_of(motion)
     assert len(panels) >= 4
     assert "tool speed (m/s)" in panels

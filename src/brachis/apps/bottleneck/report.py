@@ -20,6 +20,7 @@ from brachis.apps.bottleneck.saturation import (
     PhaseLimits,
     Saturation,
     limit_ratios,
+    limits_by_component,
     limits_by_phase,
     limits_in,
     saturations,
@@ -34,7 +35,14 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.joints import shown_unit
 from brachis.search.given_motion import narrow_motion
 from brachis.timing import TimingGap, find_timing_gap
-from brachis.trajectory import Trajectory, motion_of, phase_rows
+from brachis.trajectory import (
+    MotionPart,
+    MotionPhase,
+    Trajectory,
+    motion_of,
+    part_rows,
+    phase_rows,
+)
 from brachis.trajectory.sensitivities import STATIONARY
 
 if TYPE_CHECKING:
@@ -54,7 +62,7 @@ class BottleneckReport:
     saturations : tuple of Saturation
         When every limit is active. Limits that are active longest come first.
     phases : tuple of PhaseLimits
-        For each phase, the limits that are active in it.
+        For each phase, or each part of a program, the limits that are active in it.
     timing : TimingGap or None
         Comparison with the fastest timing of the motion's joint path; None if unknown.
     check : SensitivityCheck or None
@@ -81,6 +89,11 @@ class BottleneckReport:
     reference: Reference | None = None
     reference_sought: bool = False
 
+    @property
+    def is_of_program(self) -> bool:
+        """Whether `phases` are the parts of a program."""
+        return any(isinstance(limits.phase, MotionPart) for limits in self.phases)
+
     def __str__(self) -> str:
         """Return the report as text."""
         return self.text()
@@ -100,11 +113,12 @@ class BottleneckReport:
             if costs is not None and len(costs.limits) > len(self.check.entries):
                 lines.append("process speeds are not checked")
         lines += write_active(self.saturations)
-        rows = phase_rows([limits.phase for limits in self.phases])
-        if len(rows) > 1:
-            for (name, s, time, speed), limits in zip(rows, self.phases, strict=True):
-                motion = f"phase {name}, s = {s}, {time}, {speed}"
-                lines.append(f"{motion}; active limits: {limits}")
+        if len(self.phases) > 1:
+            descriptions = _describe([limits.phase for limits in self.phases])
+            lines += [
+                f"{text}; active limits: {limits}"
+                for text, limits in zip(descriptions, self.phases, strict=True)
+            ]
         best = self.reference
         if best is not None:
             longer = f"{100.0 * best.distance:.2f} % ({1e3 * (self.t_end - best.t_end):.1f} ms)"
@@ -132,7 +146,9 @@ class BottleneckReport:
             "sensitivities": self.sensitivities and self.sensitivities.to_dict(),
             "active_from_ratio": THRESHOLD,
             "saturations": [entry.to_dict() for entry in self.saturations],
-            "phases": [phase.to_dict() for phase in self.phases],
+            "parts" if self.is_of_program else "phases": [
+                phase.to_dict() for phase in self.phases
+            ],
             "timing_gap": self.timing and self.timing.to_dict(),
             "check": self.check and self.check.to_dict(),
             "reference": self.reference and self.reference.to_dict(),
@@ -202,6 +218,13 @@ def report(
         )
     else:
         solve = False
+    is_program = bool(trajectory.components)
+    if is_program and (reference or (check and isinstance(motion, Trajectory))):
+        raise InputError(
+            "the motion of a program cannot be planned again from itself",
+            where="reference" if reference else "check",
+            allowed="a single path or move" if reference else "the result of a plan",
+        )
     costs = motion.sensitivities
     checked = None
     best = None
@@ -211,10 +234,13 @@ def report(
     if not isinstance(motion, Trajectory):
         candidate = motion.candidate
         limits = limits_in(candidate.refined.program)
+    by_component = limits_by_component(motion, own_limits)
     began = time.perf_counter()
-    active = saturations(limit_ratios(trajectory, limits))
+    ratios = limit_ratios(trajectory, limits, by_component=by_component)
+    active = saturations(ratios)
     seconds = _LOOKS * (time.perf_counter() - began)
-    if candidate is None and ((costs is None and solve) or check or reference):
+    solve = solve and costs is None and not is_program
+    if candidate is None and (solve or check or reference):
         longest = trajectory.task.search.time_limit
         words = f"about {math.ceil(seconds)} s, no more than {longest:g} s"
         listener(
@@ -230,14 +256,15 @@ def report(
     if reference and candidate:
         listener("planning again with discontinuous torque")
         best = find_reference(candidate, families=families, listener=listener)
+    timing = None
+    if not (recovered or is_program):
+        timing = find_timing_gap(trajectory, limits)
     return BottleneckReport(
         t_end=trajectory.t_end,
         sensitivities=costs,
         saturations=active,
         phases=limits_by_phase(trajectory, active),
-        timing=None
-        if recovered or trajectory.components
-        else find_timing_gap(trajectory, limits),
+        timing=timing,
         check=checked,
         reference=best,
         reference_sought=reference,
@@ -395,6 +422,18 @@ def _check_lines(check: SensitivityCheck) -> list[str]:
             f"checked: changes larger than 0.1 ms are predicted to within {worst}{but}"
         )
     return lines
+
+
+def _describe(phases: Sequence[MotionPhase | MotionPart]) -> list[str]:
+    """Describe each phase of a motion, or each part of a program, in words."""
+    parts = [phase for phase in phases if isinstance(phase, MotionPart)]
+    if parts:
+        return [
+            f"part {name} ({kind}), {time}, {share} of the time"
+            for name, kind, time, share in part_rows(parts)
+        ]
+    rows = phase_rows([phase for phase in phases if isinstance(phase, MotionPhase)])
+    return [f"phase {name}, s = {s}, {time}, {speed}" for name, s, time, speed in rows]
 
 
 def write_active(entries: tuple[Saturation, ...]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from brachis.explain.task_figures import PROCESS_SPEED_KEY
 from brachis.limits import Label, Limit, Moments, limits_of
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.program import Program, is_safeguard
-from brachis.trajectory import MotionPhase, Samples, Trajectory
+from brachis.robot.custom_limits import LimitModel
+from brachis.trajectory import MotionPart, MotionPhase, Samples, Trajectory
+
+if TYPE_CHECKING:
+    from brachis.search.planned import PlannedMotion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,8 +78,23 @@ def limits_in(program: Program) -> list[Limit]:
     return [limit for limit in program.limits if not is_safeguard(limit)]
 
 
+def limits_by_component(
+    motion: Trajectory | PlannedMotion, own_limits: Sequence[LimitModel] = ()
+) -> list[Sequence[Limit]]:
+    """List the limits of each motion of which the motion of a program consists."""
+    if not isinstance(motion, Trajectory):
+        return [part.limits for part in motion.candidate.problem.parts]
+    return [
+        limits_of(component.robot, component.task, own_limits)
+        for _, component in motion.components
+    ]
+
+
 def limit_ratios(
-    trajectory: Trajectory, limits: Sequence[Limit] | None = None
+    trajectory: Trajectory,
+    limits: Sequence[Limit] | None = None,
+    *,
+    by_component: Sequence[Sequence[Limit]] | None = None,
 ) -> LimitRatios:
     """Compute the ratios of a trajectory to every limit at its nodes, at its knots and densely between them.
 
@@ -84,13 +103,19 @@ def limit_ratios(
     trajectory : Trajectory
     limits : sequence of Limit, optional
         Limits to compare with. Default: the limits of the trajectory's task.
+    by_component : sequence of sequence of Limit, optional
+        For a program, the limits to compare with in each of its motions (`limits_by_component`).
 
     Returns
     -------
     LimitRatios
     """
-    if limits is None:
+    if trajectory.components:
+        by_component = by_component or limits_by_component(trajectory)
+        limits = [limit for same in by_component for limit in same]
+    elif limits is None:
         limits = limits_of(trajectory.robot, trajectory.task)
+    by_component = by_component or [limits]
     nodes = trajectory.times[1:]
     jumps = np.any(trajectory.qddot_before != trajectory.qddot, axis=1)[1:]
     if trajectory.degree <= max((limit.order for limit in limits), default=0):
@@ -104,17 +129,42 @@ def limit_ratios(
     qddot[is_before_jump] = trajectory.qddot_before[1:][jumps]
     jerk = trajectory.jerk(t)
     jerk[is_before_jump] = trajectory.jerk_pieces.c[-1][jumps]
-    s = trajectory.path_coordinate(t)
-    moments = Moments(trajectory.position(t), trajectory.velocity(t), qddot, jerk, s)
-    values = [limit.ratios(moments, t) for limit in limits]
-    labels = [label for limit in limits for label in limit.labels]
+    states = (trajectory.position(t), trajectory.velocity(t), qddot, jerk)
+    # A time just before a jump belongs to the motion before it.
+    just_before = np.nextafter(t, np.where(is_before_jump, -np.inf, t))
+    pieces = trajectory.split_times(just_before)
+    columns: dict[Label, np.ndarray] = {}
+    for same, (component, rows, times) in zip(by_component, pieces, strict=True):
+        moments = _moments_of(component, times, [state[rows] for state in states])
+        for limit in same:
+            ratios = limit.ratios(moments, t[rows])
+            for label, column in zip(limit.labels, ratios.T, strict=True):
+                columns.setdefault(label, np.zeros(len(t)))[rows] = column
     for speed in sorted({phase.speed or 0.0 for phase in trajectory.phases} - {0.0}):
         label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
         text = f"the tool is held at its {label.kind}"
-        labels.append(replace(label, active_text=text, share="tool speed / limit"))
-        values.append(_has_speed(trajectory, speed, t)[:, None])
-    together = np.hstack([np.empty((len(t), 0)), *values])
-    return LimitRatios(t, tuple(labels), together)
+        held = replace(label, active_text=text, share="tool speed / limit")
+        columns[held] = _has_speed(trajectory, speed, t)
+    together = np.array(list(columns.values())).reshape(len(columns), len(t)).T
+    return LimitRatios(t, tuple(columns), together)
+
+
+def _moments_of(
+    component: Trajectory, t: np.ndarray, states: Sequence[np.ndarray]
+) -> Moments:
+    """Return states of the joints, (K, n) each, at times t of a component, with those of its virtual joints."""
+    orders = (
+        component.position,
+        component.velocity,
+        component.acceleration,
+        component.jerk,
+    )
+    count = states[0].shape[1]
+    q, qdot, qddot, qdddot = (
+        np.hstack([state, evaluate(t)[:, count:]])
+        for state, evaluate in zip(states, orders, strict=True)
+    )
+    return Moments(q, qdot, qddot, qdddot, component.path_coordinate(t))
 
 
 def _has_speed(trajectory: Trajectory, speed: float, t: np.ndarray) -> np.ndarray:
@@ -224,17 +274,17 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
 
 @dataclass(frozen=True)
 class PhaseLimits:
-    """The limits that slow one phase down.
+    """The limits that slow one phase, or one part of a program, down.
 
     Attributes
     ----------
-    phase : MotionPhase
+    phase : MotionPhase or MotionPart
     shares : tuple of (Label, float)
         Limits that are active in the phase, each with the fraction of the phase's time. Limits that are active longest
         come first.
     """
 
-    phase: MotionPhase
+    phase: MotionPhase | MotionPart
     shares: tuple[tuple[Label, float], ...]
 
     def __str__(self) -> str:
@@ -257,9 +307,9 @@ class PhaseLimits:
 def limits_by_phase(
     trajectory: Trajectory, saturated: Sequence[Saturation]
 ) -> tuple[PhaseLimits, ...]:
-    """Find the limits that are active in each phase of a motion."""
+    """Find the limits that are active in each phase of a motion, or in each part of a program."""
     phases = []
-    for phase in trajectory.phases:
+    for phase in trajectory.parts or trajectory.phases:
         shares = []
         for entry in saturated:
             overlaps = [

@@ -87,7 +87,7 @@ def inspect(
     """
     from brachis.robot import bind
     from brachis.robot.from_task import robot_from_settings
-    from brachis.task import name_task_file
+    from brachis.task import PathPart, name_task_file
 
     remarks: list[str] = []
     task = problem = tolerances = None
@@ -104,8 +104,9 @@ def inspect(
         set_it = "robot.tool_frame, robot.base_frame, robot.locked_joints"
         refuse_options(options, "a task file", f"a URDF; in a task file, set {set_it}")
         task = load_changed_task(source, keys)
-        space = space or task.task_space
-        tolerances = task.tolerances
+        first = next((p for p in task.program if isinstance(p, PathPart)), task)
+        space = space or first.task_space
+        tolerances = first.tolerances
         with name_task_file(source, keys):
             robot = robot_from_settings(task.robot)
     else:
@@ -125,7 +126,8 @@ def inspect(
         remarks.append(f"task space: {words}; --task-space chooses a different one")
     with name_task_file(None if task_space else source, keys):
         robot, task_map = bind(robot, space, tolerances)
-        candidates = brachis.ik.find_all(robot, task_map)
+        # A move has no task coordinates.
+        candidates = brachis.ik.find_all(robot, task_map) if task_map.m else []
     with name_task_file(source, keys):
         remarks += _warnings(robot, problem)
     if candidates and not any(candidate.solver for candidate in candidates):
@@ -157,7 +159,7 @@ def _problem_of(
 ) -> Problem | None:
     """Return the problem of a task, or None if it cannot be planned; `remarks` and `collisions` get the reasons."""
     from brachis.problem.plausibility import check_within_reach, of_robot, of_task
-    from brachis.problem.problem import Problem
+    from brachis.problem.program import bind_task
     from brachis.robot.plausibility import report_issues
     from brachis.scene import MANY_POSTURES
 
@@ -168,8 +170,9 @@ def _problem_of(
             f"{MANY_POSTURES} random postures; if they may touch, add [{', '.join(pair)}] to collisions.disable"
             for pair in collisions["never_free"]
         ]
-        problem = Problem.of(robot, task)
-        check_within_reach(problem)
+        problem = bind_task(robot, task)
+        for part in problem.parts:
+            check_within_reach(part)
     except InputError as error:
         report_issues(of_robot(robot) + of_task(task), strict=task.strict)
         if is_needed and not collisions["never_free"]:
@@ -185,6 +188,7 @@ def _describe(
     """Describe robot and task as plain data for JSON. Free ends, and the length of a joint path, are None."""
     from brachis.limits import describe_guarantees, joint_limits_of
     from brachis.robot.from_task import in_use
+    from brachis.task import part_names
     from brachis.task.fields import plain
 
     limits = joint_limits_of(robot) if problem is None else problem.limits
@@ -208,6 +212,7 @@ def _describe(
             "segments": [segment.kind for segment in problem.task.path],
             "length": problem.path.length if problem.task_map.axes else None,
         },
+        "parts": part_names(problem.task.program),
     }
 
 
@@ -297,11 +302,15 @@ def _print_robot(
         for end in ("start", "end"):
             posture = write_posture(data, f"{end}_posture", degrees=degrees)
             print_lines(f"{end} posture: {posture}")
+        if task.program:
+            print_lines(f"program: {', '.join(data['parts'])}")
         kinds = [segment.kind for segment in task.path]
         length = data["path"]["length"]
         long = "" if length is None else f", {length:.4g} m long"
         named = ", ".join(dict.fromkeys(kinds))
-        print_lines(f"path: {write_count(len(kinds), 'segment')} ({named}){long}")
+        if kinds:
+            count = write_count(len(kinds), "segment")
+            print_lines(f"path: {count} ({named}){long}")
         print_segments(problem.path)
         for fit in task.fits:
             print_fit(fit)
@@ -367,7 +376,7 @@ def _joint_rows(robot: Robot, *, degrees: bool = False) -> list[dict[str, str]]:
             if (lower, upper) == (-float("inf"), float("inf")):
                 text = _NONE
             row[key] = text
-        mass = robot.model.inertias[i + 1].mass
+        mass = robot.dynamic_chain.masses[i]
         row["mass"] = f"{mass:.4g} kg" if mass else _NONE
         for key in ("viscous", "coulomb", "armature"):
             value = getattr(robot.friction, key)[i]

@@ -152,12 +152,11 @@ def _plan_task(
 def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) -> None:
     """Print the plan as text for a person."""
     from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
-    from brachis.trajectory import PHASE_COLUMNS, phase_rows
+    from brachis.trajectory import phase_table
 
     candidate = result.candidate
     trajectory = result.trajectory
     solves = write_count(len(candidate.reports), "solve")
-    least_motion = result.least_motion
     rows = {
         **result.summary(),
         **({} if result.family == trajectory.branch else {"family": result.family}),
@@ -166,15 +165,16 @@ def _print_plan(result: brachis.Result, data: dict[str, Any], *, degrees: bool) 
         **data["in_use"],
         "solver": f"{result.solver_report.solver}, {result.solver_report.status.value}",
         "iterations": f"{data['iterations']} in {solves} (refined to {data['collocation_points']} collocation points)",
-        "least motion": "off" if least_motion is None else least_motion.status,
+        "least motion": result.smoothing,
     }
     if candidate.time_scaled > 1.0:
         rows["end time lengthened by"] = (
             f"{100.0 * (candidate.time_scaled - 1.0):.2g} % to meet the limits between collocation points"
         )
     print_table("plan", ("", ""), rows.items())
-    if len(trajectory.phases) > 1:
-        print_table("phases", PHASE_COLUMNS, phase_rows(trajectory.phases))
+    title, columns, phases = phase_table(trajectory)
+    if len(phases) > 1:
+        print_table(title, columns, phases)
         print_segments(candidate.problem.path)
     print_lines(*(f"path from {fit}" for fit in result.fits))
     tried = len(result.candidates)

@@ -17,7 +17,7 @@ from brachis.common.arguments import check_callable, check_keywords
 from brachis.common.files import file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
-from brachis.errors import PathError, PlanningError
+from brachis.errors import InputError, PathError, PlanningError
 from brachis.planner import RobotOrTask, plan
 from brachis.result import Result
 from brachis.robot.task_map import JOINTS
@@ -273,6 +273,13 @@ def compare(
             units=units,
             tolerance=tolerance,
             noise=noise,
+        )
+    if recorded.recovered is None:
+        raise InputError(
+            "this motion is not a recording",
+            where="recorded",
+            found="a planned motion",
+            allowed="a CSV file, or a motion that brachis.import_motion returned",
         )
     results = []
     failures = []

@@ -20,6 +20,7 @@ from brachis.apps.controller.run import (
     axes_for,
     nearest_on_path,
     verify_run,
+    with_profile,
 )
 
 __all__ = [
@@ -36,5 +37,6 @@ __all__ = [
     "robot_with_profile",
     "scale_of",
     "verify_run",
+    "with_profile",
     "without_scale",
 ]

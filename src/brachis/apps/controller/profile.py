@@ -130,7 +130,8 @@ class Profile(CheckedModel):
     path_tolerance: Positive = 1e-4
     """Maximum deviation of the tool from the path, m and rad."""
     events: dict[Name, Name] = Field(default_factory=dict)
-    """Instructions at the begin and end of a process speed: {process_on: ..., process_off: ...}."""
+    """Instructions at the begin and end of a process speed, and at events of a program: {process_on: ..., arc_on: ...}.
+    """
 
     @property
     def is_sampled(self) -> bool:
@@ -154,12 +155,12 @@ class Profile(CheckedModel):
                 problem = "a profile cannot contain this limit"
                 yield f"limits.{kind}", problem, "robot.limits in the task"
         for name in self.events:
-            if name not in EVENTS:
+            if name.startswith("process_") and name not in EVENTS:
                 yield "events", "there is no event with this name", ", ".join(EVENTS)
 
 
 EVENTS: Final = ("process_on", "process_off")
-"""Names of the events in a motion."""
+"""Names of the events at process speeds; a program may have others."""
 
 
 def profile_names() -> list[str]:

@@ -20,16 +20,22 @@ from brachis.apps.controller.profile import Profile, load_profile
 from brachis.common.arrays import interpolate_columns, spread
 from brachis.errors import InputError
 from brachis.path import Path, path_of
-from brachis.robot import Robot, TaskMap, bind
+from brachis.robot import TaskMap, bind
 from brachis.robot.custom_limits import LimitModel
-from brachis.trajectory import MotionSource, Samples, Trajectory, motion_of
+from brachis.trajectory import (
+    MotionSource,
+    Samples,
+    Trajectory,
+    change_robots,
+    motion_of,
+)
 from brachis.verify import Check, Verification, VerifyOptions
 from brachis.verify.checks import check_joints
 from brachis.verify.limits import check_limits
 from brachis.verify.limits.tool import largest_speeds
 from brachis.verify.mechanics import joint_placements, real_tool_placements
 from brachis.verify.motion import CheckedMotion
-from brachis.verify.verify import path_errors
+from brachis.verify.verify import path_errors, place_in_program
 
 _MOVING = 1e-6
 """Joint velocity below which an end of a motion counts as at rest, rad/s or m/s."""
@@ -37,6 +43,8 @@ _STILL = 1e-9
 """A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
+_FEWEST_NODES = 2
+"""Number of samples in a part of a program from which on there is a motion to check."""
 _DIVISORS = (2, 4, 8)
 """Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
@@ -126,12 +134,22 @@ def verify_run(
             found=f"{period:g} s",
             allowed=f"{profile.period:g} s ({profile.title})",
         )
-    robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-    run = _Run(motion, profile, axes, robot, tuple(own_limits))
+    motion = with_profile(motion, profile, axes)
+    run = _Run(motion, profile, axes, tuple(own_limits))
     report = run.verify(period)
     if report.passed:
         return report
     return replace(report, remedies=tuple(_find_remedies(run, period)))
+
+
+def with_profile(
+    motion: Trajectory, profile: Profile, axes: ControllerAxes
+) -> Trajectory:
+    """Return a motion whose robots have the limits of a profile too, without the factors on their limits."""
+    return change_robots(
+        motion,
+        lambda robot: robot_with_profile(without_scale(robot), profile, axes),
+    )
 
 
 def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
@@ -175,7 +193,6 @@ class _Run:
     motion: Trajectory
     profile: Profile
     axes: ControllerAxes
-    robot: Robot
     own_limits: tuple[LimitModel, ...]
 
     def verify(self, period: float) -> RunReport:
@@ -186,24 +203,20 @@ class _Run:
         if profile.decimals is not None:
             values = np.round(self.axes.encode(q), profile.decimals)
             q[:, self.axes.index] = self.axes.decode(values)
-        task = self.motion.task
-        robot, task_map = bind(self.robot, task.task_space, task.tolerances)
-        motion = CheckedMotion(
-            interpolate(self.motion, samples, q, profile.interpolation),
-            robot,
-            task_map,
-            path_of(task_map, task),
-            VerifyOptions(ratio_tolerance=task.refinement.tolerance),
-            is_sampled=profile.is_sampled,
-        )
-        ratios = check_limits(motion, self.own_limits)
-        if profile.is_sampled:
-            differences = list(_check_differences(motion))
-            replaced = {check.limit for check in differences}
-            ratios = [check for check in ratios if check.limit not in replaced]
-            ratios += differences
-        path_check = _check_path(motion, profile)
-        checks = [path_check, *ratios]
+        worst_checks: dict[str, Check] = {}
+        points = 0
+        run = interpolate(self.motion, samples, q, profile.interpolation)
+        for begin, part in self._split(run):
+            motion = self._with_path(part)
+            points += len(motion.states.t)
+            for check in self._check(motion):
+                before = worst_checks.get(check.name)
+                if before is None or check.share > before.share:
+                    placed = place_in_program(self.motion, begin, check)
+                    worst_checks[check.name] = placed
+        checks = list(worst_checks.values())
+        ratios = [check for check in checks if check.limit]
+        errors = [check.value for check in checks if check.name == "path error"]
         if profile.rest == "full":
             plan = self.motion
             ends = [0, -1]
@@ -211,16 +224,69 @@ class _Run:
             name = "acceleration at the ends"
             instants = (plan.qddot[ends], plan.times[ends])
             kind = "acceleration"
-            checks.append(check_joints(motion, name, *instants, kind, allowed))
+            whole = self._with_path(plan)
+            checks.append(check_joints(whole, name, *instants, kind, allowed))
         worst = max((check.value for check in ratios), default=0.0)
         return RunReport(
             checks=tuple(checks),
-            points=len(motion.states.t),
+            points=points,
             worst_ratio=worst,
-            path_error=path_check.value,
+            path_error=max(errors, default=0.0),
             controller=profile.title,
             period=period,
         )
+
+    def _split(self, run: Trajectory) -> Iterator[tuple[float, Trajectory]]:
+        """Yield the run of every component, with the time at which it begins, s; it consists of the nodes within."""
+        if not run.components:
+            yield 0.0, run
+        for begin, component in run.components:
+            local = run.times - begin
+            (rows,) = np.nonzero((local >= 0.0) & (local <= component.t_end))
+            if len(rows) < _FEWEST_NODES:
+                continue
+            first = local[rows[0]]
+            t = local[rows]
+            plan = component.at(t)
+            times = t - first
+            nodes: dict[str, Any] = {}
+            for name in ("q", "qdot", "qddot", "qddot_before"):
+                virtual = getattr(plan, name.removesuffix("_before"))
+                joints = getattr(run, name)[rows]
+                nodes[name] = np.hstack([joints, virtual[:, joints.shape[1] :]])
+            inner = replace(
+                component,
+                times=times,
+                degree=1,
+                knots=np.pad(times / times[-1], 1, mode="edge"),
+                control_points=plan.s[None],
+                phase_ends=times[-1:],
+                **nodes,
+            )
+            yield begin + first, inner
+
+    def _with_path(self, run: Trajectory) -> CheckedMotion:
+        """Return a run with its path, for the checks."""
+        task = run.task
+        robot, task_map = bind(run.robot, task.task_space, task.tolerances)
+        return CheckedMotion(
+            run,
+            robot,
+            task_map,
+            path_of(task_map, task),
+            VerifyOptions(ratio_tolerance=task.refinement.tolerance),
+            is_sampled=self.profile.is_sampled,
+        )
+
+    def _check(self, motion: CheckedMotion) -> list[Check]:
+        """Check the path, and the limits."""
+        ratios = check_limits(motion, self.own_limits)
+        if self.profile.is_sampled:
+            differences = list(_check_differences(motion))
+            replaced = {check.limit for check in differences}
+            ratios = [check for check in ratios if check.limit not in replaced]
+            ratios += differences
+        return [_check_path(motion, self.profile), *ratios]
 
 
 def interpolate(
@@ -295,7 +361,7 @@ def nearest_on_path(
 
     The search begins at `s`, (K,), close to them.
     """
-    for _ in range(2):
+    for _ in range(2 if values.size else 0):
         sample = path.sample(s)
         miss = task_map.difference(values, sample.target)
         along = sample.xi
@@ -390,8 +456,13 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
 
 def slow_down(motion: Trajectory, factor: float) -> Trajectory:
     """Return the motion slowed down by a factor on its duration."""
+    components = tuple(
+        (factor * begin, slow_down(component, factor))
+        for begin, component in motion.components
+    )
     return replace(
         motion,
+        components=components,
         times=motion.times * factor,
         qdot=motion.qdot / factor,
         qddot=motion.qddot / factor**2,

@@ -48,7 +48,7 @@ def message_of(rows: JointRows) -> dict[str, Any]:
 
 def write_ros2_yaml(rows: JointRows, stream: BinaryIO) -> None:
     """Write one message ``trajectory_msgs/msg/JointTrajectory``."""
-    comments = "".join(f"# {line}\n" for line in (MESSAGE, *rows.left_out))
+    comments = "".join(f"# {line}\n" for line in (MESSAGE, *rows.notes))
     message = yaml.safe_dump(
         message_of(rows), sort_keys=False, default_flow_style=None, width=np.inf
     )
@@ -95,6 +95,8 @@ def write_mcap(rows: JointRows, stream: BinaryIO) -> None:
         message = message_of(rows)
         writer.write_message(TOPIC, schema, message, log_time=0, publish_time=0)
         writer.add_metadata("brachis", {"left_out": "; ".join(rows.left_out)})
+        if rows.parts:
+            writer.add_metadata("program", {"notes": "; ".join(rows.notes)})
 
 
 _SERVOJ = "0.03, 300"
@@ -130,7 +132,7 @@ def write_urscript(rows: JointRows, stream: BinaryIO) -> None:
         f"  servoj({posture}, 0, 0, {period!r}, {_SERVOJ})\n"
         for posture, period in zip(postures, periods, strict=True)
     )
-    comments = "".join(f"  # {sentence}\n" for sentence in rows.left_out)
+    comments = "".join(f"  # {sentence}\n" for sentence in rows.notes)
     program = f"""\
 def brachis_motion():
   # {len(postures)} periods, {rows.t_end:.6g} s; joints {", ".join(rows.joints)}, rad

@@ -16,9 +16,8 @@ from brachis.apps.controller import (
     RunReport,
     axes_for,
     load_profile,
-    robot_with_profile,
     verify_run,
-    without_scale,
+    with_profile,
 )
 from brachis.apps.export.formats import FORMATS, name_format
 from brachis.apps.export.programs import ProgramReport, write_program
@@ -117,8 +116,8 @@ def write_for_controller(
         beginning = rb"(?s)" + first_line + rb".{0,900}planned by brachis"
         with atomic_write(path, beginning) as stream:
             stream.write(text.encode())
-        robot = robot_with_profile(without_scale(motion.robot), profile, axes)
-        verification = verify_trajectory(motion, robot=robot, own_limits=own_limits)
+        limited = with_profile(motion, profile, axes)
+        verification = verify_trajectory(limited, own_limits=own_limits)
         _warn(profile, verification.failures)
         return replace(report, failures=verification.failures)
     if moves != "joint":
@@ -159,4 +158,5 @@ def _rows_of(
         tau=None if samples.tau is None else axes.encode_torques(samples.tau),
     )
     end = motion.t_end
-    return JointRows(axes.names, axes.units, (), end, period, changed, profile.columns)
+    rows = JointRows(axes.names, axes.units, (), end, period, changed, profile.columns)
+    return replace(rows, parts=motion.parts, events=motion.events)

@@ -10,7 +10,7 @@ speeds up or slows down over `BLEND` times the time of the line.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from brachis.apps.controller import ControllerAxes, Language, Profile, nearest_on_path
+from brachis.apps.controller import ControllerAxes, Language, Profile
+from brachis.apps.export.deviation import Way
 from brachis.apps.export.rows import require_library
 from brachis.common.arrays import apply_each
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
-from brachis.path import path_of
-from brachis.robot import Robot, bind
+from brachis.robot import Robot
 from brachis.trajectory import Trajectory
 
 BLEND = 0.25
@@ -51,8 +51,8 @@ _REST = 1e-6
 """Joint velocity below which the arm counts as at rest, rad/s or m/s."""
 _ARM_JOINTS = 6
 """Number of joints with which a controller's inverse kinematics of the arm has a finite number of solutions."""
-_SLOW = 1e-3
-"""Path velocity, as a fraction of the mean path velocity, below which times are not compared."""
+_SAME_TIME = 1e-6
+"""Difference between an event and the end of a phase below which they are at the same time, s."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -136,11 +136,13 @@ def write_program(
             found=", ".join(axes.names),
             allowed="only the joints of the arm",
         )
-    follower = _Follower(motion, axes, language, is_linear=moves == "linear")
+    events = _events(motion, profile)
+    follower = _Follower(
+        motion, axes, language, list(events), is_linear=moves == "linear"
+    )
     nodes, place, time = follower.choose_within(tolerance, time_tolerance)
     report = ProgramReport(len(nodes), place, time)
     columns = follower.describe(nodes)
-    events = dict(_events(motion, profile))
     steps = [
         {name: column[row].tolist() for name, column in columns.items()}
         | {"event": events.get(time, "")}
@@ -194,8 +196,10 @@ class _Follower:
 
     Attributes
     ----------
-    t, s : (K,) ndarray
-        Times of the comparison, s, and path coordinates.
+    t : (K,) ndarray
+        Times of the comparison, s.
+    stations : ndarray
+        Times at which there is a position, s: ends of phases, and events.
     q : (K, n) ndarray
     followed : (K, c) ndarray
         What moves on straight lines: `q` or, for linear moves, the task coordinates.
@@ -208,12 +212,11 @@ class _Follower:
         motion: Trajectory,
         axes: ControllerAxes,
         language: Language,
+        events: Sequence[float],
         *,
         is_linear: bool,
     ) -> None:
         task = motion.task
-        _, self.task_map = bind(motion.robot, task.task_space, task.tolerances)
-        self.path = path_of(self.task_map, task)
         self.motion = motion
         self.axes = axes
         self.duration_step = language.duration_step
@@ -221,9 +224,11 @@ class _Follower:
         self.velocities = _largest_velocities(motion.robot)
         self.is_linear = is_linear
         even = np.linspace(0.0, motion.t_end, _POINTS)
-        self.t = np.union1d(even, motion.phase_ends)
+        self.stations = np.union1d(motion.phase_ends, events)
+        self.t = np.union1d(even, self.stations)
+        self.ways = [Way.of(*piece) for piece in motion.split_times(self.t)]
+        self.task_map = self.ways[0].task_map
         self.q = motion.position(self.t)
-        self.s = motion.path_coordinate(self.t)
         self.followed = self.task_map.values(self.q) if is_linear else self.q
         self.rests = np.abs(motion.velocity(self.t)).max(axis=1) < _REST
         arm_joints = axes.external.count(False)
@@ -231,7 +236,9 @@ class _Follower:
             raise InputError(
                 "linear moves need a path of poses, and an arm of six joints",
                 where="moves",
-                found=f"task_space: {task.task_space}, {arm_joints} joints",
+                found="a program of several parts"
+                if motion.parts
+                else f"task_space: {task.task_space}, {arm_joints} joints",
                 allowed="joint",
             )
         unknown = np.array(axes.joints)[np.isinf(self.velocities[axes.index])]
@@ -280,7 +287,7 @@ class _Follower:
             return place > tolerance or time > time_tolerance
 
         nodes = [0]
-        for end in np.searchsorted(self.t, self.motion.phase_ends).tolist():
+        for end in np.searchsorted(self.t, self.stations).tolist():
             while nodes[-1] < end and len(nodes) <= _MOST:
                 following = range(nodes[-1] + 2, end + 1)
                 count = bisect_left(following, 1, key=exceeds)
@@ -299,20 +306,19 @@ class _Follower:
         times = planned if durations is None else np.cumsum(durations)
         t = np.interp(self.t[rows], planned, times)
         values = nominal(times, self.followed[nodes], self.rests[nodes], t)
-        if not self.is_linear:
-            values = self.task_map.values(values)
-        s = nearest_on_path(self.path, self.task_map, values, self.s[rows])
-        miss = self.task_map.difference(values, self.path.sample(s).target)
-        # A point where the motion dwells is passed from the first to the last of its times.
-        moves = np.diff(self.s) > 0.0
-        first = np.append(True, moves)
-        last = np.append(moves, True)
-        early = np.interp(s, self.s[first], self.t[first]) - t
-        late = t - np.interp(s, self.s[last], self.t[last])
-        motion = self.motion
-        fast = motion.path_spline(self.t[rows], nu=1) > _SLOW / motion.t_end
-        time = np.maximum(early, late)[fast].max(initial=0.0)
-        return float(np.max(self.task_map.norms(miss))), float(time)
+        place = 0.0
+        time = 0.0
+        for way in self.ways:
+            inside = (way.rows >= nodes[0]) & (way.rows <= nodes[-1])
+            if inside.any():
+                chosen = way.rows[inside] - nodes[0]
+                late = (t - self.t[rows])[chosen]
+                deviations = way.deviate(
+                    values[chosen], late, inside, is_linear=self.is_linear
+                )
+                place = max(place, deviations[0])
+                time = max(time, deviations[1])
+        return place, time
 
     def check_postures(self, nodes: np.ndarray) -> None:
         """Refuse lines of the tool along which an arm would come to other postures than those of the plan.
@@ -426,7 +432,42 @@ def nominal(
     return np.asarray(nodes[0] + distance(t))
 
 
-def _events(motion: Trajectory, profile: Profile) -> Iterator[tuple[float, str]]:
+def _events(motion: Trajectory, profile: Profile) -> dict[float, str]:
+    """Return the instructions at which a process begins or ends, and those of a program's events, by their time, s.
+
+    Raises
+    ------
+    InputError
+        The profile has no instruction for an event, or two events occur at the same time.
+    """
+    events = dict(_process_events(motion, profile))
+    ends = np.append(0.0, motion.phase_ends)
+    for event in motion.events:
+        if event.name not in profile.events:
+            raise InputError(
+                "the controller has no instruction for an event of the program",
+                where="profile.events",
+                found=event.name,
+                allowed=", ".join(profile.events) or "none in this profile",
+                hint=f"Write a profile with extends: and events: {{{event.name}: ...}}",
+            )
+        nearest = float(ends[np.argmin(np.abs(ends - event.time))])
+        is_same = abs(nearest - event.time) < _SAME_TIME
+        time = nearest if is_same else event.time
+        if time in events:
+            raise InputError(
+                "a program of positions has one instruction at a time",
+                where="program.events",
+                found=f"{event.name} and another at {time:.4f} s",
+                hint="Give one of them a lead",
+            )
+        events[time] = profile.events[event.name]
+    return events
+
+
+def _process_events(
+    motion: Trajectory, profile: Profile
+) -> Iterator[tuple[float, str]]:
     """Yield the times, s, and instructions at which a process begins or ends."""
     is_process = [phase.kind == "given speed" for phase in motion.phases]
     ends = [0.0, *motion.phase_ends.tolist()]

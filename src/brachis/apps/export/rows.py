@@ -17,7 +17,7 @@ from brachis.errors import (
     NotInstalledError,
     check_names,
 )
-from brachis.trajectory import Samples, Trajectory
+from brachis.trajectory import Event, MotionPart, Samples, Trajectory
 from brachis.trajectory.samples import COLUMNS
 
 _PER = {"q": "", "qd": "/s", "qdd": "/s^2", "tau": None}
@@ -46,6 +46,10 @@ class JointRows:
         The motion of these joints, in their units, and of the tool.
     quantities : tuple of str
         Quantities in a table, as prefixes of `COLUMNS`.
+    parts : tuple of MotionPart
+        Parts of a program.
+    events : tuple of Event
+        Events of a program.
     """
 
     joints: tuple[str, ...]
@@ -55,6 +59,18 @@ class JointRows:
     dt: float
     samples: Samples
     quantities: tuple[str, ...] = tuple(COLUMNS)
+    parts: tuple[MotionPart, ...] = ()
+    events: tuple[Event, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences for the head of a file: on joints that are left out, on the parts, and on the events."""
+        parts = (
+            f"part {part.name} ({part.kind}): {part.begin:.6f} to {part.end:.6f} s"
+            for part in self.parts
+        )
+        events = (f"event {event.name}: {event.time:.6f} s" for event in self.events)
+        return (*self.left_out, *parts, *events)
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of a table, (K,), by name: ``t``, then those of the joints with units except SI."""
@@ -141,6 +157,8 @@ def rows_of(
         trajectory.t_end,
         dt,
         replace(samples, **columns),
+        parts=trajectory.parts,
+        events=trajectory.events,
     )
 
 

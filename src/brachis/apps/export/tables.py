@@ -21,11 +21,12 @@ def write_csv(rows: JointRows, stream: BinaryIO) -> None:
 
     The header is ``t``, then ``q_<joint>`` of all joints, ``qd_<joint>``, ``qdd_<joint>`` and ``tau_<joint>``, in
     s, rad (m), rad/s (m/s), rad/s^2 (m/s^2) and Nm (N); torques are left out if the URDF has no masses. If a joint
-    that moves is left out, a line that begins with ``#`` stands before the header.
+    that moves is left out, a line that begins with ``#`` stands before the header; so do lines with the parts and
+    events of a program.
     """
     columns = rows.columns()
     text = io.StringIO()
-    text.writelines(f"# brachis: {sentence}\n" for sentence in rows.left_out)
+    text.writelines(f"# brachis: {sentence}\n" for sentence in rows.notes)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     # repr gives the shortest text that reads back as the same float.
@@ -36,13 +37,14 @@ def write_csv(rows: JointRows, stream: BinaryIO) -> None:
 def write_parquet(rows: JointRows, stream: BinaryIO) -> None:
     """Write the same table as `write_csv`, as Parquet.
 
-    The metadata key ``brachis`` contains the joints with their units, the end time in s, and sentences about moving
-    joints that are left out.
+    The metadata key ``brachis`` contains the joints with their units, the end time in s, sentences about moving joints
+    that are left out, and the parts and events of a program.
     """
     pyarrow = require_library("pyarrow", "a Parquet file")
     parquet = require_library("pyarrow.parquet", "a Parquet file")
     units = dict(zip(rows.joints, rows.units, strict=True))
     about = {"joints": units, "t_end_s": rows.t_end, "left_out": rows.left_out}
+    about |= _describe_program(rows)
     table = pyarrow.table(rows.columns())
     metadata = {"brachis": json.dumps(about)}
     parquet.write_table(table.replace_schema_metadata(metadata), stream)
@@ -145,6 +147,29 @@ _SCHEMA: Final = """\
       "title": "Warnings",
       "type": "array"
     },
+    "parts": {
+      "description": "Parts of a program, with their times, s.",
+      "items": {
+        "properties": {
+          "name": {"type": "string"},
+          "kind": {"enum": ["path", "move", "approach", "retract", "dwell"]},
+          "begin": {"type": "number"},
+          "end": {"type": "number"}
+        },
+        "type": "object"
+      },
+      "title": "Parts",
+      "type": "array"
+    },
+    "events": {
+      "description": "Events of a program, with their times, s.",
+      "items": {
+        "properties": {"name": {"type": "string"}, "time": {"type": "number"}},
+        "type": "object"
+      },
+      "title": "Events",
+      "type": "array"
+    },
     "samples": {"$ref": "#/$defs/_Samples"}
   },
   "required": ["$schema", "joint_names", "position_units", "t_end", "dt", "warnings", "samples"],
@@ -161,6 +186,15 @@ def samples_schema() -> dict[str, Any]:
     return schema
 
 
+def _describe_program(rows: JointRows) -> dict[str, Any]:
+    """Return the parts and events of a program as plain data for JSON; empty for other motions."""
+    return {
+        name: [vars(item) for item in items]
+        for name, items in (("parts", rows.parts), ("events", rows.events))
+        if items
+    }
+
+
 def write_json(rows: JointRows, stream: BinaryIO) -> None:
     """Write samples as JSON that conforms to `samples_schema`."""
     names = ("t", "s", *rows.samples.columns.values())
@@ -171,6 +205,7 @@ def write_json(rows: JointRows, stream: BinaryIO) -> None:
         "t_end": rows.t_end,
         "dt": rows.dt,
         "warnings": rows.left_out,
+        **_describe_program(rows),
         "samples": {name: getattr(rows.samples, name).tolist() for name in names},
     }
     lines = (

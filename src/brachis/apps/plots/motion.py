@@ -217,7 +217,7 @@ def draw_panels(
         ax = figure.add_subplot(grid[row + number, column])
         _draw_panel(ax, panel)
         dress(ax, trajectory, panel.label)
-        style.mark_phases(ax, trajectory.phases, labels=number == 0)
+        style.mark_phases(ax, trajectory, labels=number == 0)
         axes.append(ax)
     for ax in axes[:-1]:
         ax.sharex(axes[-1])
@@ -322,7 +322,7 @@ def plot_timeline(
         spans = [(active.begin, active.end - active.begin) for active in entry.active]
         ax.broken_barh(spans, (edges[0], thick), color=orange, linewidth=0.8)
     dress(ax, trajectory, "")
-    style.mark_phases(ax, trajectory.phases, labels=False)
+    style.mark_phases(ax, trajectory, labels=False)
     ax.set_ylim(rows - 0.5, -0.5)
     ax.set_yticks(
         range(len(entries)),

@@ -195,17 +195,26 @@ def _bound_tool_speed(
     trajectory: Trajectory, samples: Samples
 ) -> tuple[CurveBound, CurveBound]:
     """Return minus infinity, and the maximum tool speed that the task allows, (K,), m/s."""
-    limit = build_tool_speed(trajectory.robot, trajectory.task)
-    largest = np.inf if limit is None else limit.largest_at(samples.s)[0].min(axis=1)
+    largest = np.full(len(samples.t), np.inf)
+    for component, rows, t in trajectory.split_times(samples.t):
+        limit = build_tool_speed(component.robot, component.task)
+        if limit is not None:
+            s = component.path_coordinate(t)
+            largest[rows] = limit.largest_at(s)[0].min(axis=1)
     return -np.inf, largest
 
 
 def _smallest_distances(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Return the distances of the closest pairs of bodies, (K,), m."""
-    scene = scene_of(trajectory.robot, trajectory.task)
-    assert scene is not None
-    placed = Chain.of(trajectory.robot.model).place(samples.q)
-    return scene.find_closest(placed).distance
+    distances = np.full(len(samples.t), np.nan)
+    chain = Chain.of(trajectory.robot.model)
+    for component, rows, _ in trajectory.split_times(samples.t):
+        scene = scene_of(component.robot, component.task)
+        if scene is not None and len(scene.pairs) and len(rows):
+            placed = chain.place(samples.q[rows])
+            distances[rows] = scene.find_closest(placed).distance
+    # Without pairs, nothing is close.
+    return np.where(np.isnan(distances), np.nanmax(distances), distances)
 
 
 PANELS = {
@@ -260,8 +269,11 @@ def joint_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
 
 def tool_rows_of(trajectory: Trajectory) -> tuple[str, ...]:
     """Return the titles of the tool rows, including the clearance if the task checks collisions."""
-    scene = scene_of(trajectory.robot, trajectory.task)
-    has_pairs = scene is not None and len(scene.pairs) > 0
+    tasks = [
+        (part.robot, part.task) for part, _, _ in trajectory.split_times(np.zeros(1))
+    ]
+    scenes = [scene_of(*pair) for pair in tasks]
+    has_pairs = any(scene is not None and len(scene.pairs) for scene in scenes)
     return ("tool speed", "clearance") if has_pairs else ("tool speed",)
 
 
@@ -308,7 +320,7 @@ def _joint_panels(
     """Make the panels of a joint row, one for each unit."""
     row = PANELS[name]
     robot = trajectory.robot
-    lower, upper = robot.limits.both_ways(name)
+    lower, upper = _joint_bounds(trajectory, samples.t, name)
     columns = row.values(trajectory, samples).T
     names = trajectory.joint_names
     panels = []
@@ -328,6 +340,19 @@ def _joint_panels(
             ratio = f"{title} in its range" if row.is_range else f"{title} / limit"
             panels.append(Panel(title, symbol, unit, samples.t, tuple(curves), ratio))
     return panels
+
+
+def _joint_bounds(trajectory: Trajectory, t: np.ndarray, name: str) -> np.ndarray:
+    """Return the limits of the joints, (2, n), or (2, n, K) at times t, (K,), if parts of a program have others."""
+    pieces = list(trajectory.split_times(t))
+    n = trajectory.robot.n
+    limits = [piece[0].robot.limits.both_ways(name)[:, :n] for piece in pieces]
+    if all(np.array_equal(limits[0], other) for other in limits):
+        return limits[0]
+    bounds = np.empty((2, n, len(t)))
+    for ends, (_, rows, _) in zip(limits, pieces, strict=True):
+        bounds[:, :, rows] = ends[:, :, None]
+    return bounds
 
 
 def curves_of(panels: Sequence[Panel], name: str) -> list[tuple[Panel, PanelCurve]]:

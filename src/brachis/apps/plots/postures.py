@@ -13,6 +13,7 @@ from brachis.apps.bottleneck.saturation import dense_samples
 from brachis.apps.plots import style
 from brachis.common import tolerances
 from brachis.robot import Robot, task_map_of
+from brachis.robot.chain import path_frame_in_world
 from brachis.trajectory import Samples, Trajectory, of_motion
 
 if TYPE_CHECKING:
@@ -24,20 +25,28 @@ if TYPE_CHECKING:
 def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return postures `q`, (K, n), as polylines in the world frame, (K, 2 n + 2, 3), m.
 
-    A polyline goes from the base through every joint to the tool. Each joint has two points, before and after its
-    motion; for a revolute joint, they are the same.
+    A polyline goes from the base, or from the workpiece, through every joint to the tool. Each joint has two points,
+    before and after its motion; for a revolute joint, they are the same.
     """
     model = robot.model
     base = model.getFrameId(robot.base_frame, pin.FrameType.BODY)
     bones = np.empty((len(q), 2 * robot.n + 2, 3))
     for points, data in zip(bones, robot.place_joints(q), strict=True):
-        points[0] = model.frames[base].placement.translation
+        seen = path_frame_in_world(data, robot.world)
+        points[0] = seen.act(model.frames[base].placement.translation)
         for joint in range(1, robot.n + 1):
             before = data.oMi[model.parents[joint]] * model.jointPlacements[joint]
-            points[2 * joint - 1] = before.translation
-            points[2 * joint] = data.oMi[joint].translation
-        points[-1] = data.oMf[robot.frame_id].translation
+            points[2 * joint - 1] = seen.act(before.translation)
+            points[2 * joint] = seen.act(data.oMi[joint].translation)
+        points[-1] = seen.act(data.oMf[robot.frame_id].translation)
     return bones
+
+
+def tool_in_world(robot: Robot, samples: Samples) -> np.ndarray:
+    """Return the tool's positions in the world, (K, 3), m."""
+    if robot.settings.workpiece_frame is None:
+        return samples.tool_position
+    return skeleton(robot, robot.of_real_joints(samples.q))[:, -1]
 
 
 def drawing_plane(robot: Robot, axes: Sequence[int]) -> tuple[int, int] | None:
@@ -105,7 +114,7 @@ def draw_postures(
     in_space = {} if plane else {"projection": "3d", "computed_zorder": False}
     ax: Any = figure.add_subplot(place, **in_space)
     view = list(plane or (0, 1, 2))
-    tool = samples.tool_position[:, view]
+    tool = tool_in_world(trajectory.robot, samples)[:, view]
     times = np.linspace(0.0, trajectory.t_end, len(_SHADES))
     postures = skeleton(trajectory.robot, trajectory.position(times))[:, :, view]
     ax.plot(*tool.T, label="tool path", zorder=20.0, gid="tool path", **_PATH)

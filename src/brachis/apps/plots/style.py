@@ -16,7 +16,7 @@ import numpy as np
 
 from brachis.common.files import BEGINNINGS, atomic_write, file_name
 from brachis.errors import InputError, NotInstalledError
-from brachis.trajectory import MotionPhase
+from brachis.trajectory import MotionPart, MotionPhase, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -153,6 +153,10 @@ LIMIT: dict[str, Any] = {
 }
 """Line properties of limits in all figures."""
 GREY = "#666666"
+_EVENT = "#B00060"
+"""Colour of events."""
+_LETTER = 0.021
+"""Width of a letter as a fraction of the width of a panel; wider names of parts are written upwards."""
 FAINT = "#CFCFCF"
 
 
@@ -191,19 +195,38 @@ def dress(ax: Axes, xlabel: str, ylabel: str) -> None:
         spine.set_linewidth(0.6)
 
 
-def mark_phases(ax: Axes, phases: Sequence[MotionPhase], *, labels: bool) -> None:
-    """Draw a line wherever phases meet. With `labels`, also write the kind of each phase if there is room."""
+def mark_phases(ax: Axes, trajectory: Trajectory, *, labels: bool) -> None:
+    """Draw a line wherever phases, or parts of a program, meet, and at each event.
+
+    With `labels`, also write the kind of each phase or the name of each part if there is room, and the names of events.
+    """
+    phases: Sequence[MotionPart | MotionPhase] = trajectory.parts or trajectory.phases
+    t_end = trajectory.t_end
     for phase in phases[:-1]:
         ax.axvline(phase.end, color=GREY, linewidth=0.6, linestyle=":", zorder=0.6)
-    if not labels or len(phases) == 1:
+    for event in trajectory.events:
+        ax.axvline(event.time, color=_EVENT, linewidth=0.8, linestyle="--", zorder=0.6)
+    if not labels:
+        return
+    for event in trajectory.events:
+        look = {"rotation": 90.0, "ha": "right", "va": "bottom", "color": _EVENT}
+        write(ax, event.time / t_end, 0.02, plain(event.name), **look)
+    if len(phases) == 1:
         return
     for number, phase in enumerate(phases, start=1):
-        if phase.duration < 0.06 * phases[-1].end:
+        room = phase.duration / t_end
+        if room < 0.06:
             continue
-        texts = {"move": str(number), "given speed": f"{phase.speed} m/s"}
-        text = texts.get(phase.kind, phase.kind)
-        place = 0.5 * (phase.begin + phase.end) / phases[-1].end
-        write(ax, place, 0.98, text, ha="center", va="top", color=GREY)
+        rotation = 0.0
+        if isinstance(phase, MotionPart):
+            text = plain(phase.name)
+            rotation = 90.0 if room < _LETTER * len(text) else 0.0
+        else:
+            texts = {"move": str(number), "given speed": f"{phase.speed} m/s"}
+            text = texts.get(phase.kind, phase.kind)
+        place = 0.5 * (phase.begin + phase.end) / t_end
+        look = {"rotation": rotation, "ha": "center", "va": "top", "color": GREY}
+        write(ax, place, 0.98, text, **look)
 
 
 def write(ax: Axes, x: float, y: float, text: str, **look: Any) -> None:

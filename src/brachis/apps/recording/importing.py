@@ -33,6 +33,7 @@ from brachis.planner import RobotOrTask
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
 from brachis.robot.task_map import JOINTS, JointSpace
+from brachis.robot.task_map.choice import FREE
 from brachis.robots import is_robot, locate
 from brachis.task import (
     CsvSegment,
@@ -122,6 +123,13 @@ def import_motion(
     given_robot, settings = _read_robot(robot, task)
     default = settings.task_space if settings else ik.default_task_space(given_robot)
     space = task_space or default
+    if settings and settings.task_space == FREE:
+        raise InputError(
+            "a recorded motion is compared with a path",
+            where="robot" if task is None else "task",
+            found="a task with a program" if settings.program else "a move",
+            allowed="a task with a path, or a robot",
+        )
     recording = read_recording(path, given_robot, check_units(units or {}))
     tolerances = settings.tolerances if settings else None
     bound, task_map = bind(given_robot, space, tolerances)

@@ -119,7 +119,6 @@ def reported_motion(
 def _describe_plan(result: PlannedMotion) -> dict[str, Any]:
     """Return the entries of the report that are known only for a newly planned motion."""
     report = result.solver_report
-    least = result.least_motion
     not_completed = result.not_completed
     if result.interrupted:
         early = "the search ended early: a faster motion may have been missed"
@@ -133,7 +132,7 @@ def _describe_plan(result: PlannedMotion) -> dict[str, Any]:
             "solver": f"{report.solver}, {report.status.value}",
             "collocation points": str(result.candidate.collocation_points),
             "planning time": f"{result.timing['total']:.2f} s",
-            "least motion": "off" if least is None else least.status,
+            "least motion": result.smoothing,
             "timing": str(result.timing_gap or "no timing of this joint path is known"),
         },
     }

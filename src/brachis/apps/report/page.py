@@ -21,7 +21,7 @@ from brachis.apps.report.figures import motion_figure, scene, timeline_figure
 from brachis.apps.report.motion import ReportedMotion, reported_motion
 from brachis.common.files import BEGINNINGS, atomic_write, check_suffix
 from brachis.search.planned import PlannedMotion
-from brachis.trajectory import PHASE_COLUMNS, Trajectory
+from brachis.trajectory import Trajectory, phase_table
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,12 +120,13 @@ def make_report(
         "timeline": timeline_figure(reported),
         "scene": scene(reported),
     }
+    _, phase_columns, _ = phase_table(reported.trajectory)
     data = json.dumps(sections, allow_nan=False, separators=(",", ":"))
     page = template.render(
         title=title or reported.trajectory.robot.name or "motion",
         motion=reported,
         tables=tables,
-        phase_columns=(*PHASE_COLUMNS, "active limits"),
+        phase_columns=(*phase_columns, "active limits"),
         kinds=joint_rows_of(reported.trajectory),
         pictures=_pictures(reported),
         data=data.replace("<", "\\u003c"),  # so that no text can end the script element

@@ -17,9 +17,8 @@ from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
 from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
-from brachis.robot.from_task import in_use
 from brachis.task import Task
-from brachis.trajectory import phase_rows
+from brachis.trajectory import phase_table, settings_in_use
 
 NEAR = 0.9
 """Ratio to a limit above which a value is marked as close to this limit; 1 is the limit itself."""
@@ -35,6 +34,8 @@ def figures_of_merit(motion: ReportedMotion) -> dict[str, str]:
     boundary = trajectory.task.boundary
     branch = trajectory.branch
     named = {} if branch in {"", CHART} else {"branch": branch}
+    if trajectory.events:
+        named["events"] = ", ".join(map(str, trajectory.events))
     fastest = np.argmax(samples.tool_speed)
     ends = "repeats without end" if boundary.periodic else "from rest to rest"
     if boundary.start_speed or boundary.end_speed:
@@ -64,17 +65,22 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
         source["recovered from"] = _file_name(trajectory.recovered.source)
     steps = np.diff(motion.samples.tool_position, axis=0)
     length = np.linalg.norm(steps, axis=1).sum()
-    space = task.task_space
-    rows = space if isinstance(space, str) else ", ".join(space)
+    components = [part.task for _, part in trajectory.components]
+    tasks = [part for part in components if part.path] or [task]
+    spaces = (part.task_space for part in tasks)
+    rows = (space if isinstance(space, str) else ", ".join(space) for space in spaces)
+    described = (
+        f"{'; then '.join(map(describe_path, tasks))}; the tool moves {length:.3f} m"
+    )
     texts = {"URDF": trajectory.urdf, "task as it stands below": task_text(task)}
     return {
         "robot": name,
-        "path": f"{describe_path(task)}; the tool moves {length:.3f} m; prescribed: {rows}",
+        "path": f"{described}; prescribed: {'; '.join(dict.fromkeys(rows))}",
         **source,
         "payload": "none",
         "tool offset": "none",
         "mounting": "at the world's origin, upright",
-        **in_use(trajectory.robot, trajectory.node_accelerations),
+        **settings_in_use(trajectory),
         "report of": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         **{
             f"SHA-256 of the {what}": hashlib.sha256(text.encode()).hexdigest()
@@ -146,9 +152,9 @@ def what_limits(motion: ReportedMotion) -> str:
 
 
 def phases_with_limits(motion: ReportedMotion) -> list[tuple[str, ...]]:
-    """List the phases, each with its active limits. For a motion with only one phase, the list is empty."""
+    """List the phases or parts, each with its active limits. For a motion with only one phase, the list is empty."""
     phases = limits_by_phase(motion.trajectory, motion.saturations)
-    rows = phase_rows(motion.trajectory.phases)
+    _, _, rows = phase_table(motion.trajectory)
     if len(rows) == 1:
         return []
     return [(*row, str(limits)) for row, limits in zip(rows, phases, strict=True)]
@@ -193,9 +199,12 @@ def _find_peak(panel: Panel, curve: PanelCurve, tolerance: float) -> dict[str, s
     if not curve.is_limited:
         return {"value": value, "limit": "", "share": "", "level": ""}
     share = ratios[worst]
-    limit = f"{_write_number(float(curve.upper))} {panel.unit}"
-    if curve.upper != -curve.lower:
-        limit = f"{_write_number(float(curve.lower))} to {limit}"
+    # Parts of a program may have limits of their own.
+    pair = (np.broadcast_to(end, ratios.shape) for end in (curve.lower, curve.upper))
+    lower, upper = (float(end[worst]) for end in pair)
+    limit = f"{_write_number(upper)} {panel.unit}"
+    if upper != -lower:
+        limit = f"{_write_number(lower)} to {limit}"
     edges = (("beyond", 1.0 + tolerance), ("at", THRESHOLD), ("near", NEAR))
     return {
         "value": value,

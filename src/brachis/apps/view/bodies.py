@@ -23,6 +23,7 @@ from brachis.common.words import name_first
 from brachis.errors import InputError
 from brachis.path import path_of
 from brachis.robot import Robot, task_map_of
+from brachis.robot.chain import path_frame_in_world
 from brachis.robot.urdf_elements import Element, read_tree
 from brachis.scene import Solid, scene_of
 from brachis.scene.chain import Chain
@@ -194,15 +195,16 @@ def placements(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     positions : (K, n + 2, 3) ndarray
-        Positions of the world, of the frame that each joint moves, and of the tool, in the world frame, m.
+        Positions of the frame of the paths, of the frame that each joint moves, and of the tool, in the world frame, m.
     quaternions : (K, n + 2, 4) ndarray
         Orientations of these frames: w, x, y, z.
     """
     tool = robot.frame_id
-    rows = [
-        [pin.SE3ToXYZQUAT(placed) for placed in (*data.oMi, data.oMf[tool])]
-        for data in robot.place_joints(q)
-    ]
+    rows = []
+    for data in robot.place_joints(q):
+        seen = path_frame_in_world(data, robot.world)
+        placed = (*data.oMi, data.oMf[tool])
+        rows.append([pin.SE3ToXYZQUAT(seen * frame) for frame in placed])
     frames = np.array(rows)
     return frames[..., :3], frames[..., [6, 3, 4, 5]]
 
@@ -214,7 +216,7 @@ class Bodies:
     Attributes
     ----------
     links : dict of int to list of Trimesh
-        Visual shapes of the URDF and bodies of the scene; joint 0 is the world.
+        Visual shapes of the URDF and bodies of the scene; joint 0 is the frame of the paths.
     skeleton : dict of int to list of Trimesh
         Shapes for the joints and for the straight lines between them.
     unread : tuple of str
@@ -256,7 +258,8 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
     positions, quaternions = placements(robot, q)
     size = np.ptp(positions, axis=(0, 1)).max()
     skeleton = _skeleton(trajectory, max(size, 1e-3) * 0.012)
-    moving = [positions[:, 1:].reshape(-1, 3)]
+    world = robot.world[0]
+    moving = [np.delete(positions, world, axis=1).reshape(-1, 3)]
     still: list[np.ndarray] = []
     for joint, meshes in (links or skeleton).items():
         corners_of_link = np.concatenate(
@@ -264,7 +267,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         )
         turns = Rotation.from_quat(quaternions[:, joint], scalar_first=True).as_matrix()
         corners = positions[:, joint, None] + corners_of_link @ turns.transpose(0, 2, 1)
-        (moving if joint else still).append(corners.reshape(-1, 3))
+        (still if joint == world else moving).append(corners.reshape(-1, 3))
     box, moving_box = (
         np.array([points.min(axis=0), points.max(axis=0)])
         for points in map(np.concatenate, (still + moving, moving))
@@ -310,13 +313,14 @@ def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
 
 def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     """Return the path at the motion's own s, (K, 3), m. Coordinates that the path leaves free are those of the tool."""
-    task_map = task_map_of(trajectory.robot, trajectory.task.task_space)
-    axes = list(task_map.axes)
     points = samples.tool_position.copy()
-    if axes:
-        path = path_of(task_map, trajectory.task)
-        target = path.sample(np.clip(samples.s, 0.0, 1.0)).target
-        points[:, axes] = target[:, : len(axes)]
+    for component, rows, t in trajectory.split_times(samples.t):
+        task_map = task_map_of(component.robot, component.task.task_space)
+        axes = list(task_map.axes)
+        if axes:
+            path = path_of(task_map, component.task)
+            s = np.clip(component.path_coordinate(t), 0.0, 1.0)
+            points[rows[:, None], axes] = path.sample(s).target[:, : len(axes)]
     return points
 
 

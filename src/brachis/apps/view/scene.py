@@ -17,6 +17,9 @@ from brachis.trajectory import Trajectory
 if TYPE_CHECKING:
     import viser
 
+_PATHS = "/joint 0"
+"""Name of the frame of the paths in the scene."""
+
 
 class ViewerScene:
     """A robot and its motion in the browser.
@@ -66,11 +69,12 @@ class ViewerScene:
         self.layers["tool frame"].append(tool)
         self.layers["world frame"].append(self._frame("/world", 0.15))
         self._draw_ground()
-        self._cell = scene_of(self._robot, trajectory.task)
-        if self._cell is not None and len(self._cell.pairs):
+        parts = [part for part, _, _ in trajectory.split_times(np.zeros(1))]
+        self._cells = [scene_of(part.robot, part.task) for part in parts]
+        if any(cell is not None and len(cell.pairs) for cell in self._cells):
             line = (np.zeros((2, 3)), (200, 30, 30), 3.0)
-            self._draw_line("closest pair", "/closest/line", *line)
-            label = self._api.add_label("/closest/label", "")
+            self._draw_line("closest pair", f"{_PATHS}/closest/line", *line)
+            label = self._api.add_label(f"{_PATHS}/closest/label", "")
             self.layers["closest pair"].append(label)
         hidden = "skeleton" if self.bodies.shows_links else "robot"
         for name in ("world frame", hidden):
@@ -82,14 +86,17 @@ class ViewerScene:
         for handle in self.layers[name]:
             handle.visible = visible
 
-    def show(self, q: np.ndarray) -> None:
-        """Show the robot in the posture `q`, (n,)."""
+    def show(self, t: float) -> None:
+        """Show the robot at a time, s."""
+        q = self._trajectory.position(t)
         positions, quaternions = placements(self._robot, q[None])
         for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
-        if self._cell is not None and "closest pair" in self.layers:
-            self._show_closest(self._cell, q)
+        begins = [begin for begin, _ in self._trajectory.components[1:]]
+        cell = self._cells[int(np.searchsorted(begins, t, side="right"))]
+        if cell is not None and len(cell.pairs):
+            self._show_closest(cell, q)
 
     def _show_closest(self, cell: Scene, q: np.ndarray) -> None:
         """Draw a line between the closest bodies in a posture, (n,), and write their distance."""
@@ -158,10 +165,13 @@ class ViewerScene:
     def _draw_path(self) -> None:
         """Draw the prescribed path and mark its ends."""
         points = prescribed_path(self._trajectory, self.samples)
-        self._draw_line("path", "/path", points, (30, 30, 30), 2.5)
+        self._draw_line("path", f"{_PATHS}/path", points, (30, 30, 30), 2.5)
         for name, k, colour in (("start", 0, (0, 158, 115)), ("end", -1, (213, 94, 0))):
             ball = self._api.add_icosphere(
-                f"/path/{name}", 0.009 * self._size, color=colour, position=points[k]
+                f"{_PATHS}/path/{name}",
+                0.009 * self._size,
+                color=colour,
+                position=points[k],
             )
             self.layers["path"].append(ball)
 
@@ -173,7 +183,7 @@ class ViewerScene:
         colours = speed_colours(np.linspace(0.0, 1.0, 32))
         points = self.samples.tool_position
         for shade in np.unique(shades).tolist():
-            name = f"/trace/{shade}"
+            name = f"{_PATHS}/trace/{shade}"
             drawn = shades == shade
             self._draw_line("tool trace", name, points, colours[shade], 7.0, drawn)
 
@@ -223,7 +233,8 @@ class ViewerScene:
         camera.far = 100.0 * distance
         camera.look_at = self.bodies.moving_box.mean(axis=0)
         positions, _ = placements(self._robot, self.samples.q)
-        reach = (self.samples.tool_position - positions[:, 1]).mean(axis=0)
+        first = self._robot.urdf_dynamics.carriers + 1
+        reach = (positions[:, -1] - positions[:, first]).mean(axis=0)
         azimuth = np.arctan2(reach[1], reach[0]) - np.radians(50.0)
         directions = {
             None: (np.cos(azimuth), np.sin(azimuth), 0.55),

@@ -10,7 +10,7 @@ import numpy as np
 
 from brachis.apps.plots.panels import curves_of, panels_of
 from brachis.search.candidate_table import STATUS, TIMES, WORDS, candidate_rows
-from brachis.trajectory import PHASE_COLUMNS, Samples, Trajectory, phase_rows
+from brachis.trajectory import Samples, Trajectory, phase_table
 
 _CELL = "padding:0 0.35em;white-space:nowrap"
 _WRAPPED = "padding:0 0.35em 0.2em 0;vertical-align:top;overflow-wrap:anywhere"
@@ -34,10 +34,13 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
         f"t = {now.t[0]:.4f} s of {trajectory.t_end:.4f} s, s = {now.s[0]:.4f}",
         f"tool at {place} m, {now.tool_speed[0]:.3f} m/s",
     ]
-    phases = trajectory.phases
+    title, _, phases = phase_table(trajectory)
     if len(phases) > 1:
-        number = np.searchsorted(trajectory.phase_ends[:-1], now.t[0], "right")
-        lines.append(f"phase {number + 1} of {len(phases)}: {phases[number].kind}")
+        ends = [phase.end for phase in trajectory.parts or trajectory.phases]
+        number = int(np.searchsorted(ends[:-1], now.t[0], "right"))
+        name = phases[number][0].removeprefix(f"{number + 1} ")
+        word = title.removesuffix("s")
+        lines.append(f"{word} {number + 1} of {len(phases)}: {name}")
     head = _paragraph(*lines)
     panels = panels_of(trajectory, now, *_STATE, degrees=degrees)
     titles = ("joint", "position", "velocity", "torque, force")
@@ -53,9 +56,9 @@ def state_table(trajectory: Trajectory, now: Samples, *, degrees: bool = False) 
 
 
 def phases_table(trajectory: Trajectory) -> str:
-    """Return a table of the phases of the motion; for a single phase, it is empty."""
-    rows = phase_rows(trajectory.phases)
-    return _table(PHASE_COLUMNS, rows) if len(rows) > 1 else ""
+    """Return a table of the phases or parts of the motion; for a single phase, it is empty."""
+    _, columns, rows = phase_table(trajectory)
+    return _table(columns, rows) if len(rows) > 1 else ""
 
 
 def candidates_table(candidates: Sequence[Mapping[str, Any]]) -> str:

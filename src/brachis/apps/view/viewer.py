@@ -108,7 +108,7 @@ class Viewer(AbstractContextManager["Viewer"]):
     def show(self) -> None:
         """Show the motion at the current instant of the playback."""
         with self._lock, self._server.atomic():
-            self._scene.show(self._trajectory.position(self.playback.time))
+            self._scene.show(self.playback.time)
             self._update()
 
     def wait(self) -> None:
@@ -149,7 +149,7 @@ class Viewer(AbstractContextManager["Viewer"]):
                 continue
             with self._lock, self._server.atomic():
                 t = self.playback.advance(elapsed)
-                self._scene.show(self._trajectory.position(t))
+                self._scene.show(t)
                 picture += 1
                 if picture % 3 == 0:
                     self._update()
@@ -199,6 +199,7 @@ class Viewer(AbstractContextManager["Viewer"]):
             "time (s)", 0.0, t_end, 1e-3, initial_value=0.0, marks=ends
         )
         self._slider.on_update(self._drag)
+        self._add_parts()
         self._button = self._gui.add_button("Pause")
         self._button.on_click(self._toggle)
         speeds = [f"{rate:g} x real time" for rate in RATES]
@@ -210,6 +211,26 @@ class Viewer(AbstractContextManager["Viewer"]):
         hint = "The report on the motion as one HTML page"
         download = self._gui.add_button("Download the report", hint=hint)
         download.on_click(self._send_report)
+
+    def _add_parts(self) -> None:
+        """Add a list of the parts and events of a program, which shows the instant of the chosen one."""
+        motion = self._trajectory
+        times = {
+            f"{part.name} ({part.begin:.3f} s)": part.begin for part in motion.parts
+        }
+        times |= {f"event {event}": event.time for event in motion.events}
+        if len(times) > 1:
+            parts = self._gui.add_dropdown("go to", [*times])
+            parts.on_update(partial(self._go_to, times))
+
+    def _go_to(
+        self,
+        times: Mapping[str, float],
+        event: viser.GuiEvent[viser.GuiDropdownHandle[str]],
+    ) -> None:
+        """Show the instant of the chosen part or event, and pause the playback there."""
+        self.playback.go_to(times[event.target.value])
+        self.show()
 
     def _drag(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         """Show the instant chosen with the slider, and pause the playback there."""

@@ -41,7 +41,8 @@ def worst_clearance(motion: CheckedMotion) -> Worst | None:
     least = search.least
     remark = f"smallest distance {1e3 * least:.2f} mm"
     subject = scene.names(search.pair)
-    stands = (scene.pairs >= scene.robot_count) & (scene.joints[scene.pairs] == 0)
+    in_world = scene.joints[scene.pairs] == motion.robot.world[0]
+    stands = (scene.pairs >= scene.robot_count) & in_world
     to_bodies = np.where(stands.any(axis=1), search.distances, np.inf)
     nearest = int(to_bodies.argmin())
     if nearest != search.pair and to_bodies[nearest] < clearance + _LOOK:
@@ -172,13 +173,18 @@ def _reaches(motion: CheckedMotion, scene: Scene) -> np.ndarray:
     slides = [farthest[j] if body.sliding else 0.0 for j, body in enumerate(bodies)]
     lengths = [np.linalg.norm(body.placement[:3, 3]) for body in bodies]
     along = np.cumsum(np.array(lengths) + slides)
+    starts = np.append(0.0, along)
     centres, radii = scene.balls
     reach = np.zeros((len(bodies), len(scene.pairs)))
     for number, pair in enumerate(scene.pairs):
         inner, outer = sorted(pair, key=lambda solid: scene.joints[solid])
         last = scene.joints[outer]
-        size = np.linalg.norm(centres[outer]) + radii[outer]
+        size = np.linalg.norm(centres, axis=1) + radii
         for j in range(scene.joints[inner], last):
-            far = along[last - 1] - along[j] + size
+            far = along[last - 1] - along[j] + size[outer]
+            if np.isinf(
+                far
+            ):  # the outer solid is a half-space: seen from it, the inner one moves
+                far = along[j] - starts[scene.joints[inner]] + size[inner]
             reach[j, number] = 1.0 if bodies[j].sliding else far
     return reach
