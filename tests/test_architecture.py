@@ -46,6 +46,7 @@ ORDER = (
     "result",
     "planner",
     "apps.controller_plan",
+    "apps.place",
     "apps.recording",
     "apps.comparison",
     "apps.sweeps",

@@ -8,7 +8,7 @@
     result.plot()
 
 Planning           plan, plan_many, transcribe (the nonlinear program itself)
-Many plans         sweep, SweepResult: keys of a task varied over grids or at random, also on a cluster
+Many plans         sweep, SweepResult: keys of a task varied; place, Placing: workpiece or base moved to a faster place
 A path             Line, Arc, Circle, Helix, Spline, joined by +; fit_path, bspline_segment from points and curves
 A program          Program: paths, moves between them, approaches, dwells
 A scene            Box, Sphere, Cylinder, Capsule, HalfSpace, Mesh: bodies that the robot keeps clear of
@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from brachis.apps.controller import profile_names as profile_names
     from brachis.apps.controller import verify_run as verify_run
     from brachis.apps.controller_plan import plan_for_controller as plan_for_controller
+    from brachis.apps.place import Placing as Placing
+    from brachis.apps.place import place as place
     from brachis.apps.recording import import_motion as import_motion
     from brachis.apps.sweeps import SweepResult as SweepResult
     from brachis.apps.sweeps import sweep as sweep
@@ -112,6 +114,7 @@ _NAMES = {
     "apps.comparison": "Comparison Tracking compare compare_run",
     "apps.controller": "Profile RunReport load_profile profile_names verify_run",
     "apps.controller_plan": "plan_for_controller",
+    "apps.place": "Placing place",
     "apps.recording": "import_motion",
     "apps.sweeps": "SweepResult sweep",
     "apps.view": "view",

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from brachis.explain.multipliers import Multipliers, multipliers_of
+from brachis.explain.multipliers import LOOSE, NEAR, Multipliers, multipliers_of
+from brachis.explain.placement import placement_gradients
 from brachis.explain.savings import task_savings
 from brachis.explain.sensitivities import sensitivities_at, sensitivities_of_timing
 from brachis.explain.task_figures import (
     STEP_OF_TIMING,
+    Lagrangian,
+    LeastTime,
     OptimalMotion,
     figure_sensitivities,
-    lagrangian_of,
-    least_time_of,
 )
+from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.retiming import SOLVER
 from brachis.problem.problem import Problem
-from brachis.trajectory.sensitivities import Sensitivities, Sensitivity
+from brachis.trajectory.sensitivities import Gradient, Sensitivities, Sensitivity
 
 _BALANCED = 0.02
 """Maximum fraction of the gradient that multipliers may leave unbalanced. If they leave more, timings of the motion are
@@ -54,31 +56,43 @@ def explain_motion(
     program = optimum.program
     x = optimum.report.x
     multipliers = _find_multipliers(motion, optimum)
+    time_ratio = motion.t_end / optimum.t_end
     if multipliers is None:
         costs = sensitivities_of_timing(motion)
-        timed = (motion.program, motion.x, least_time_of)
+        timed = (motion.program, motion.x, LeastTime(motion.program))
         answer = OptimalMotion(problem, *timed, step=STEP_OF_TIMING)
+        time_ratio = 1.0
     else:
         costs = sensitivities_at(program, multipliers)
-        lagrangian = lagrangian_of(program, multipliers)
+        lagrangian = Lagrangian(program, multipliers)
         answer = OptimalMotion(problem, program, x, lagrangian)
-    if problem.is_chain:
-        return replace(costs, limits=_merge_figures(costs.limits, 1.0))
-    time_ratio = 1.0 if multipliers is None else motion.t_end / optimum.t_end
     figures = (*figure_sensitivities(answer), *costs.limits)
     limits = _merge_figures(figures, time_ratio)
-    savings = task_savings(problem, motion, answer)
-    return replace(costs, limits=limits, task=savings)
+    savings = () if problem.is_chain else task_savings(problem, motion, answer)
+    if multipliers is None:
+        multipliers = _find_multipliers(motion, optimum, LOOSE)
+        if multipliers is not None:
+            lagrangian = Lagrangian(program, multipliers)
+            answer = OptimalMotion(problem, program, x, lagrangian)
+            time_ratio = motion.t_end / optimum.t_end
+    gradients = placement_gradients(answer, time_ratio)
+    speeds = tuple(
+        Gradient("tool", entry.label.kind, "m/s", entry.derivative)
+        for entry in limits
+        if entry.label.cause == PROCESS_SPEED
+    )
+    return replace(costs, limits=limits, task=savings, gradients=gradients + speeds)
 
 
 def _find_multipliers(
-    motion: SolvedProgram, optimum: SolvedProgram
+    motion: SolvedProgram, optimum: SolvedProgram, distances: Sequence[float] = NEAR
 ) -> Multipliers | None:
     """Find the multipliers of the optimum; None if timings of the motion are more accurate."""
     report = optimum.report
     if report.solver == SOLVER:
         return None
-    multipliers = multipliers_of(optimum.program, report.x, report.multipliers)
+    of_solver = report.multipliers
+    multipliers = multipliers_of(optimum.program, report.x, of_solver, distances)
     is_timed = motion.report.solver == SOLVER
     return None if is_timed and multipliers.residual > _BALANCED else multipliers
 

@@ -15,6 +15,7 @@ finds it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +23,11 @@ import numpy as np
 
 from brachis.optimise.program import Program
 
+NEAR = (1e-8, 1e-7, 1e-6, 1e-5)
+"""Distances from a bound, dimensionless, within which rows and variables count as active, in the order in which they
+are tried. A row that is close to its bound but not active would count as a row that becomes active within any step."""
+LOOSE = (1e-4, 1e-3)
+"""The same for a solver that ended early. They serve if only other parts of a problem than the bounds change."""
 _INDEPENDENT = 1e-9
 """Length below which a slope, or the part of it that is independent of earlier slopes, counts as a rounding error."""
 
@@ -173,7 +179,10 @@ class Multipliers:
 
 
 def multipliers_of(
-    program: Program, x: np.ndarray, of_solver: np.ndarray | None = None
+    program: Program,
+    x: np.ndarray,
+    of_solver: np.ndarray | None = None,
+    distances: Sequence[float] = NEAR,
 ) -> Multipliers:
     """Find the multipliers at a solution.
 
@@ -183,6 +192,8 @@ def multipliers_of(
     x : (v,) ndarray
     of_solver : (c,) ndarray, optional
         The solver's multipliers of the rows; the Lagrangian is L = t_E - of_solver . rows.
+    distances : sequence of float, optional
+        See `NEAR`.
 
     Returns
     -------
@@ -198,8 +209,7 @@ def multipliers_of(
     if of_solver is None:
         del sources["solver"]
     tried = []
-    # A row that is close to its bound but not active would count as a row that becomes active within any step.
-    for near in (1e-8, 1e-7, 1e-6, 1e-5):
+    for near in distances:
         active_set = ActiveSet.at(program, x, near)
         for source, of_rows in sources.items():
             weights = active_set.weights_of(gradient, of_rows)

@@ -9,7 +9,7 @@ change of the least time along it.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -22,10 +22,11 @@ from brachis.errors import InputError, UnreachableError
 from brachis.explain.multipliers import Multipliers
 from brachis.explain.sensitivities import label_of_speed
 from brachis.explain.timings import FINE_PLACES, lay_course, least_time
+from brachis.limits import LIMIT_BUILDERS, Limit, build_limits, limits_of
 from brachis.limits.tool import PROCESS_SPEED
 from brachis.optimise.boundary import Boundary
 from brachis.optimise.phase import Phase
-from brachis.optimise.program import Program
+from brachis.optimise.program import Program, is_safeguard
 from brachis.optimise.transcription import boundary_of
 from brachis.path import (
     legs_of,
@@ -39,8 +40,6 @@ from brachis.task import Task
 from brachis.task.segments import BSplineSegment
 from brachis.trajectory.sensitivities import Sensitivity
 
-Value = Callable[[Program, np.ndarray], float]
-"""A function of a program and a point, (v,), that changes by as much as t_E, s, if a figure of the task changes."""
 STEP_OF_TIMING = 1e-2
 """Fraction by which figures are changed in timings; the stations of a timing cause an error of about 1e-6 of its
 time."""
@@ -48,44 +47,71 @@ PROCESS_SPEED_KEY = "tool_limits.process_speed"
 """Key of the task that lists the process speeds that are not given by segments."""
 
 
-def lagrangian_of(program: Program, multipliers: Multipliers) -> Value:
-    """Return the Lagrangian as a function of a program and a point.
+class Lagrangian:
+    """The Lagrangian of a program at its solution, as a function of a program with as many phases and limits.
 
     It has only the rows of limits and links, because the other rows change if the tool moves at an end of the path.
-    Limits without active rows are left out, because distances between bodies take long to compute.
+
+    Parameters
+    ----------
+    program : Program
+    multipliers : Multipliers
+
+    Attributes
+    ----------
+    limits : dict of Limit to None
+        The limits with active rows. The others are left out, because distances between bodies take long to compute.
     """
-    active = multipliers.active_set
-    of_rows = multipliers.weights[: len(active.rows)]
-    weights = np.zeros(len(program.lower))
-    np.add.at(weights, active.rows, active.signs * of_rows)
 
-    limits = dict.fromkeys(
-        limit for limit in program.limits if weights[program.rows_of(limit)].any()
-    )
-    links = sum(link.size for link in program.links)
+    def __init__(self, program: Program, multipliers: Multipliers) -> None:
+        active = multipliers.active_set
+        of_rows = multipliers.weights[: len(active.rows)]
+        weights = np.zeros(len(program.lower))
+        np.add.at(weights, active.rows, active.signs * of_rows)
+        self.limits = dict.fromkeys(
+            limit for limit in program.limits if weights[program.rows_of(limit)].any()
+        )
+        self._phases = program.phases
+        self._weights = weights[self._find_rows(program, self.limits)]
 
-    def find_rows(program: Program) -> np.ndarray:
+    def _find_rows(self, program: Program, limits: Iterable[Limit]) -> np.ndarray:
+        """Return the numbers of the rows of limits and of all links."""
         of_limits = [program.rows_of(limit).ravel() for limit in limits]
         end = len(program.lower)
-        return np.concatenate([*of_limits, np.arange(end - links, end)])
+        of_links = np.arange(end - sum(link.size for link in program.links), end)
+        return np.concatenate([*of_limits, of_links])
 
-    weights = weights[find_rows(program)]
-
-    def value(program: Program, x: np.ndarray) -> float:
+    def __call__(self, program: Program, x: np.ndarray) -> float:
         """Return the Lagrangian of a program at x, (v,), s."""
-        program = program.with_phases(
-            phase.with_limits([limit for limit in phase.limits if limit in limits])
-            for phase in program.phases
+        phases = []
+        for phase, before in zip(program.phases, self._phases, strict=True):
+            pairs = zip(phase.limits, before.limits, strict=True)
+            limits = [limit for limit, known in pairs if known in self.limits]
+            phases.append(phase.with_limits(limits))
+        program = program.with_phases(phases)
+        rows = program.rows(x)[self._find_rows(program, program.limits)]
+        return program.end_time(x) - float(self._weights @ rows)
+
+
+class LeastTime:
+    """The least time along the joint paths of a point.
+
+    Attributes
+    ----------
+    limits : dict of Limit to None
+        The limits that a longer time relieves.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.limits = dict.fromkeys(
+            limit for limit in program.limits if limit.longer_time == "relieves"
         )
-        rows = program.rows(x)[find_rows(program)]
-        return program.end_time(x) - float(weights @ rows)
 
-    return value
-
-
-def least_time_of(program: Program, x: np.ndarray) -> float:
-    """Return the least time along the joint paths of a point, (v,); NaN if the speed of a phase is given."""
-    return sum(least_time(lay_course(*pair, FINE_PLACES)) for pair in program.split(x))
+    def __call__(self, program: Program, x: np.ndarray) -> float:
+        """Return the least time, s, at x, (v,); NaN if the speed of a phase is given."""
+        return sum(
+            least_time(lay_course(*pair, FINE_PLACES)) for pair in program.split(x)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +125,8 @@ class OptimalMotion:
         Program of the problem.
     x : (v,) ndarray
         The solution.
-    value : callable
-        `lagrangian_of` the program, or `least_time_of`.
+    value : Lagrangian or LeastTime
+        Function of a program and a point that changes by as much as t_E, s, if the problem changes.
     step : float
         Fraction by which figures are changed.
     """
@@ -108,30 +134,65 @@ class OptimalMotion:
     problem: Problem
     program: Program
     x: np.ndarray
-    value: Value
+    value: Lagrangian | LeastTime
     step: float = 1e-4
 
     def change(self, changed: Problem) -> float:
         """Return the change of t_E, s, to first order, for a changed problem with as many legs; 0 if out of reach."""
-        phases = []
-        x_by_phase = []
-        for number, (phase, x_of_phase) in enumerate(self.program.split(self.x)):
-            path = changed.leg_paths[number]
-            joint_map = phase.joint_map.along(path, phase.joint_map.start)
-            boundary = _with_conditions_of(
-                phase.boundary, boundary_of(changed, joint_map, number)
-            )
-            arguments = (joint_map, phase.limits, phase.grid, boundary)
-            shifted = Phase(*arguments, margin=None, pause=phase.pause)
-            phases.append(shifted)
-            x_by_phase.append(_carry_over(phase, x_of_phase, shifted))
-        program = self.program.with_phases(phases)
         try:
-            after = self.value(program, np.concatenate(x_by_phase))
+            after = self.value_of(changed)
         except UnreachableError:
             return 0.0
         change = after - self._unchanged
         return change if np.isfinite(change) else 0.0
+
+    def value_of(self, changed: Problem, *, has_new_limits: bool = False) -> float:
+        """Return `value`, s, for a changed problem with as many legs; NaN if it is not known.
+
+        Parameters
+        ----------
+        changed : Problem
+        has_new_limits : bool, optional
+            Whether the limits are those of the changed robots and tasks of its parts.
+
+        Raises
+        ------
+        UnreachableError
+            The motion is out of reach.
+        """
+        phases = []
+        x_by_phase = []
+        points = iter(self.program.split(self.x))
+        for part in changed.parts:
+            renewed = self._renew_limits(part) if has_new_limits else {}
+            replaced: dict[Limit, Limit] = {}
+            for number, path in enumerate(part.leg_paths):
+                phase, x = next(points)
+                joint_map = phase.joint_map
+                if not joint_map.is_move:
+                    joint_map = joint_map.along(path, joint_map.start)
+                boundary = _with_conditions_of(
+                    phase.boundary, boundary_of(part, joint_map, number)
+                )
+                for limit in phase.limits:
+                    if limit not in replaced and limit.kind in renewed:
+                        replaced[limit] = limit.select_from(renewed[limit.kind])
+                limits = [replaced.get(limit, limit) for limit in phase.limits]
+                arguments = (joint_map, limits, phase.grid, boundary)
+                shifted = Phase(*arguments, margin=None, pause=phase.pause)
+                phases.append(shifted)
+                x_by_phase.append(_carry_over(phase, x, shifted))
+        program = self.program.with_phases(phases)
+        return self.value(program, np.concatenate(x_by_phase))
+
+    def _renew_limits(self, part: Problem) -> dict[str, Limit]:
+        """Build those limits, by kind, that have an effect on `value`, for the robot and the task of a part."""
+        kinds = {limit.kind for limit in self.value.limits if not is_safeguard(limit)}
+        if kinds <= set(LIMIT_BUILDERS):
+            limits = build_limits(part.robot, part.task, kinds)
+        else:
+            limits = limits_of(part.robot, part.task, part.own_limits)
+        return {limit.kind: limit for limit in limits}
 
     @cached_property
     def _unchanged(self) -> float:
@@ -171,13 +232,15 @@ TaskFigure = tuple[Sensitivity, Callable[[float], Problem]]
 def figure_sensitivities(motion: OptimalMotion) -> tuple[Sensitivity, ...]:
     """Derive the costs of the task's figures; figures that cannot be made larger are left out."""
     costs = []
-    for cost, change in (*_speeds(motion.problem), *_blends(motion.problem)):
-        step = motion.step * cost.figure
-        try:
-            changed = change(cost.figure + step)
-        except InputError:
-            continue
-        costs.append(replace(cost, derivative=motion.change(changed) / step))
+    problem = motion.problem
+    for number, part in enumerate(problem.parts):
+        for cost, change in (*_speeds(part), *_blends(part)):
+            step = motion.step * cost.figure
+            try:
+                changed = problem.with_part(number, change(cost.figure + step))
+            except InputError:
+                continue
+            costs.append(replace(cost, derivative=motion.change(changed) / step))
     return tuple(costs)
 
 
@@ -195,7 +258,16 @@ def _speeds(problem: Problem) -> Iterator[TaskFigure]:
         )
         changed = limits.model_copy(update={"process_speed": sections})
         task = problem.task.model_copy(update={"tool_limits": changed})
-        return _with_legs(replace(problem, task=task))
+        segments = tuple(
+            segment.model_copy(update={"speed": after})
+            if getattr(segment, "speed", None) == before
+            else segment
+            for segment in task.path
+        )
+        if segments == task.path:
+            return _with_legs(replace(problem, task=task))
+        # The leads of segments are longer at a higher speed.
+        return _with_task(problem, task.model_copy(update={"path": segments}))
 
     for speed in sorted({section.speed for section in limits.process_speed}):
         sections = [

@@ -117,10 +117,15 @@ def limits_of(
     InputError
         A user's limit does not fit the robot, or is not valid (see `build_own_limits`).
     """
-    built = [build(robot, task) for build in LIMIT_BUILDERS.values()]
-    limits = [limit for limit in built if limit is not None]
+    limits = build_limits(robot, task, LIMIT_BUILDERS)
     models = list_models(task, own_limits)
     return (*limits, *build_own_limits(models, robot, limits, LIMIT_BUILDERS))
+
+
+def build_limits(robot: Robot, task: Task, kinds: Iterable[str]) -> Sequence[Limit]:
+    """Build the built-in limits of some kinds that a task on a robot has."""
+    built = [LIMIT_BUILDERS[kind](robot, task) for kind in kinds]
+    return [limit for limit in built if limit is not None]
 
 
 def joint_limits_of(robot: Robot) -> tuple[Limit, ...]:
@@ -147,6 +152,7 @@ __all__ = [
     "Moments",
     "Partials",
     "Role",
+    "build_limits",
     "describe_guarantees",
     "joint_limits_of",
     "limits_of",

@@ -8,6 +8,8 @@ nearest points w_a and w_b,
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from brachis.common.arrays import LastCall, count_each
@@ -52,7 +54,7 @@ class Clearance(Limit):
     def __init__(self, chain: Chain, scene: Scene, clearance: float) -> None:
         count = len(scene.pairs)
         self._chain = chain
-        self._scene = scene
+        self.scene = scene
         self._clearance = clearance
         self._close_pairs = LastCall(self._find_close_pairs)
         self.labels = tuple(
@@ -70,23 +72,32 @@ class Clearance(Limit):
         """Return the limit for the pairs that come close in postures, (K, n); None if no pair does."""
         q = q[np.isfinite(q).all(axis=1)]
         within = self._clearance + _NEARBY * _FAR
-        close = self._scene.find_close(self._chain.place(q), within)
+        close = self.scene.find_close(self._chain.place(q), within)
         pairs = np.unique(close.pair)
         if not len(pairs):
             return None
-        return Clearance(self._chain, self._scene.with_pairs(pairs), self._clearance)
+        return self.with_scene(self.scene.with_pairs(pairs))
+
+    def select_from(self, limit: Limit) -> Limit:
+        """Return the limit of a scene with the same solids in other places for the pairs of this limit."""
+        assert isinstance(limit, Clearance)
+        return limit.with_scene(replace(limit.scene, pairs=self.scene.pairs))
+
+    def with_scene(self, scene: Scene) -> Clearance:
+        """Return the limit for another scene."""
+        return Clearance(self._chain, scene, self._clearance)
 
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), no pair is too close, (K,) bool."""
         within = (self.lower.min(initial=np.inf) - slack) * UNIT
-        close = self._scene.find_close(self._chain.place(q), within)
+        close = self.scene.find_close(self._chain.place(q), within)
         return np.bincount(close.posture, minlength=len(q)) == 0
 
     def holds_between(
         self, first: np.ndarray, last: np.ndarray, slack: float
     ) -> np.ndarray:
         """Tell on which straight steps no pair is too close; solids move at most `_STRIDE` between checks."""
-        ends = [self._scene.centres(self._chain.place(q)) for q in (first, last)]
+        ends = [self.scene.centres(self._chain.place(q)) for q in (first, last)]
         moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1, initial=0.0)
         count = np.ceil(moved / _STRIDE).clip(1, _MOST_STRIDES).astype(int) - 1
         number = np.repeat(np.arange(len(count)), count)
@@ -98,7 +109,7 @@ class Clearance(Limit):
         return free
 
     def _find_close_pairs(self, q: np.ndarray) -> ClosePairs:
-        return self._scene.find_close(self._chain.place(q), self._clearance + _FAR)
+        return self.scene.find_close(self._chain.place(q), self._clearance + _FAR)
 
     def values(self, motion: JointStates) -> np.ndarray:
         """Compute the distances, (K, P), in units of `UNIT`."""
@@ -111,7 +122,7 @@ class Clearance(Limit):
     def partials(self, motion: JointStates) -> Partials:
         """Differentiate the distances with respect to q, (K, P, n); 0 for pairs that are far apart."""
         close = self._close_pairs(motion.q)
-        joints = self._scene.joints[self._scene.pairs[close.pair]]
+        joints = self.scene.joints[self.scene.pairs[close.pair]]
         placed = self._chain.place(motion.q)
         slopes = np.zeros((len(close.pair), motion.q.shape[1]))
         for side, sign in ((0, -1.0), (1, 1.0)):

@@ -378,6 +378,10 @@ class Limit(Description, ABC):
         """Return the part of the limit that matters close to postures, (K, n); None if no part does."""
         return self
 
+    def select_from(self, limit: Limit) -> Limit:
+        """Return the values of this limit from the same limit of a changed robot or task."""
+        return limit
+
     def holds_at_rest(self, q: np.ndarray, slack: float) -> np.ndarray:
         """Tell in which postures, (K, n), the resting arm violates the limit by at most `slack`, (K,) bool."""
         values = self.values(Moments.at_rest(q))

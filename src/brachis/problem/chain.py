@@ -108,6 +108,11 @@ class ProblemChain(Problem):
         """The problems whose motions follow one another."""
         return self.chained
 
+    def with_part(self, number: int, part: Problem) -> Problem:
+        """Return the program with another part in place of the part with a number."""
+        parts = (*self.chained[:number], part, *self.chained[number + 1 :])
+        return replace(self, chained=parts)
+
     @property
     def joins(self) -> list[tuple[int, int]]:
         """Numbers of the parts before and after each place where postures are free and must be equal."""

@@ -140,6 +140,10 @@ class Problem(Summary):
         """The problems whose motions follow one another: only this one; see `brachis.problem.chain.ProblemChain`."""
         return (self,)
 
+    def with_part(self, _number: int, part: Problem) -> Problem:
+        """Return the problem with another part in place of the part with a number."""
+        return part
+
     @property
     def joins(self) -> list[tuple[int, int]]:
         """Numbers of the parts before and after each place where postures are free and must be equal."""

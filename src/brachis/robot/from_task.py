@@ -171,6 +171,16 @@ def lock_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     return Robot.from_settings(locked, robot.source, robot.urdf)
 
 
+def with_settings(robot: Robot, **changes: Any) -> Robot:
+    """Return the robot with other settings, and with the same limits and friction."""
+    gravity = tuple(robot.model.gravity.linear.tolist())
+    settings = robot.settings.model_copy(update={"gravity": gravity, **changes})
+    changed = Robot.from_settings(settings, robot.source, robot.urdf)
+    if robot.tool_joints:
+        changed = with_tool_joints(changed, robot.tool_joints)
+    return replace(changed, limits=robot.limits, friction=robot.friction)
+
+
 def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:
     """Write the friction of some joints, given by their indices, as settings."""
     keys = ("armature", "viscous", "coulomb", "coulomb_velocity")

@@ -16,6 +16,7 @@ import numpy as np
 
 from brachis.common import tolerances
 from brachis.errors import UnreachableError
+from brachis.ik import Family
 from brachis.kinematics import (
     CHART,
     ChartMap,
@@ -26,19 +27,28 @@ from brachis.kinematics import (
     transversality,
 )
 from brachis.optimise.backends import solvers_for
-from brachis.problem.problem import Decomposition, Problem
+from brachis.problem.chain import ProblemChain
+from brachis.problem.problem import Decomposition, Decompositions, Problem
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import lock_joints
 from brachis.robot.task_map import JointSpace
 from brachis.search.guesses import FAMILY, bring_onto_path
 from brachis.search.joint_choice import SELECTABLE
 from brachis.search.least_motion import LeastMotion
+from brachis.search.moves import guess_along
 from brachis.search.schedule import has_charts
-from brachis.search.stages import FinishedCandidate, InitialGuess, SearchMap
+from brachis.search.stages import (
+    ChainGuess,
+    FinishedCandidate,
+    InitialGuess,
+    SearchMap,
+)
 from brachis.task import Posture, Task, Tolerances
 from brachis.trajectory import Trajectory
 from brachis.verify import verify_trajectory
 
+_STATIONS_OF_MOVES = 97
+"""Number of postures along the joint path of a move."""
 GIVEN = "given motion"
 EXACT = "from the plan without tolerances"
 """Origins of guesses."""
@@ -71,8 +81,9 @@ def given_guess(
     UnreachableError
         The motion cannot be used; the text says why, in plain words.
     """
-    if problem.is_chain or motion.components:
-        raise UnreachableError("a program is not planned from a known motion")
+    if isinstance(problem, ProblemChain):
+        families = getattr(decompositions, "families", ())
+        return _given_chain_guess(problem, families, motion, origin)
     joints = problem.robot.urdf_joints
     motion_joints = motion.robot.urdf_joints
     if not set(joints) <= set(motion_joints):
@@ -107,6 +118,51 @@ def given_guess(
         solvers_for(problem.task.solver.name)[0].name,
         durations=tuple(np.diff(ends).tolist()),
     )
+
+
+def _given_chain_guess(
+    problem: ProblemChain, families: Sequence[Family], motion: Trajectory, origin: str
+) -> ChainGuess:
+    """Turn the known motion of a program into an initial guess; the moves are bent so that they meet the paths."""
+    parts = problem.parts
+    motions = [component for _, component in motion.components]
+    if len(motions) != len(parts):
+        raise UnreachableError("it has not the parts of this program")
+    of_paths = {
+        number: given_guess(part, Decompositions(part, families), known, origin)
+        for number, (part, known) in enumerate(zip(parts, motions, strict=True))
+        if part.task_map.m
+    }
+    ends = {
+        number: guess.postures_at(np.array([0.0, 1.0]))[:, : problem.robot.n]
+        for number, guess in of_paths.items()
+    }
+    guesses = []
+    for number, (part, known) in enumerate(zip(parts, motions, strict=True)):
+        if number in of_paths:
+            guesses.append(of_paths[number])
+            continue
+        fraction = np.linspace(0.0, 1.0, _STATIONS_OF_MOVES)
+        q = _positions(part, known, fraction * known.t_end)
+        before = ends.get(number - 1 if number else len(parts) - 1)
+        after = ends.get((number + 1) % len(parts))
+        first, last = q[[0, -1]]
+        if part.start is None and before is not None:
+            first = before[1]
+        if part.end is None and after is not None:
+            last = after[0]
+        q = (
+            q
+            + np.outer(1.0 - fraction, first - q[0])
+            + np.outer(fraction, last - q[-1])
+        )
+        guesses.append(guess_along(part, q, origin))
+    guesses = [
+        replace(guess, solver=solvers_for(problem.task.solver.name)[0].name)
+        for guess in guesses
+    ]
+    guess = ChainGuess.of_parts(problem, guesses, motion.t_end)
+    return replace(guess, origin=origin)
 
 
 def without_tolerances(task: Task) -> Task:

@@ -19,6 +19,7 @@ from brachis.search.stages import Candidate, FinishedCandidate
 from brachis.task import FitReport, Task
 from brachis.timing import TimingGap
 from brachis.trajectory import Samples, Trajectory, settings_in_use
+from brachis.trajectory.sensitivities import Gradient
 from brachis.verify import Verification
 
 if TYPE_CHECKING:
@@ -81,6 +82,11 @@ class PlannedMotion(Summary):
             return explain_motion(
                 candidate.problem, candidate.refined, candidate.optimum
             )
+
+    @property
+    def gradients(self) -> tuple[Gradient, ...]:
+        """Derivatives of the end time with respect to placements, payload and process speeds."""
+        return self.sensitivities.gradients
 
     def to_dataframe(self, dt: float) -> pd.DataFrame:
         """Return a pandas table with a row every `dt` seconds."""

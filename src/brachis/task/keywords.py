@@ -159,6 +159,8 @@ def task_with(
     content: dict[str, Any] = {"brachis": 1}
     if source is not None:
         content = load_task(source).model_dump(exclude_unset=True)
+        if not content.get("path"):  # a move or a program
+            content.pop("path", None)
     for key, value in keywords.items():
         change = {key: _in_full(key, value)}
         if key in _SECTION_OF:

@@ -91,6 +91,40 @@ class TaskSaving:
 
 
 @dataclass(frozen=True)
+class Gradient:
+    """Derivative of the end time with respect to a placement or a mass.
+
+    Attributes
+    ----------
+    subject : str
+        What is changed: the name of a frame, ``path`` for paths in the world, ``base``, ``payload``, or ``tool``.
+    figure : str
+        ``x``, ``y`` and ``z`` along the axes of the world; ``roll``, ``pitch`` and ``yaw`` about them, through the
+        origin of the frame, of the base, or the beginning of the path; ``mass``; or a process speed.
+    unit : str
+        ``m``, ``rad``, ``kg`` or ``m/s``.
+    derivative : float or None
+        Derivative of the end time t_E, s per unit; None if there is none.
+    note : str
+        Why there is no derivative.
+    """
+
+    subject: str
+    figure: str
+    unit: str
+    derivative: float | None
+    note: str = ""
+
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """The row of a table: what changes, in which way, and the derivative with its unit, or why there is none."""
+        if self.derivative is None:
+            return self.subject, self.figure, self.note
+        per = "s/(m/s)" if self.unit == "m/s" else f"s/{self.unit}"
+        return self.subject, self.figure, f"{self.derivative:+.4g} {per}"
+
+
+@dataclass(frozen=True)
 class BranchBoundary:
     """The time that the boundary of the branch costs; the boundary depends on the redundant joints, not on the robot.
 
@@ -137,6 +171,8 @@ class Sensitivities(Summary):
         tightened.
     task : tuple of TaskSaving
         Savings from changes of the task. The largest come first.
+    gradients : tuple of Gradient
+        Derivatives with respect to the placements of workpieces and base, and to the payload.
     """
 
     limits: tuple[Sensitivity, ...]
@@ -145,6 +181,7 @@ class Sensitivities(Summary):
     residual: float
     unique: bool
     task: tuple[TaskSaving, ...] = ()
+    gradients: tuple[Gradient, ...] = ()
 
     @property
     def reliable(self) -> bool:
@@ -165,6 +202,7 @@ class Sensitivities(Summary):
             "limits": [entry.to_dict() for entry in self.limits],
             "branch_boundaries": [entry.to_dict() for entry in self.boundaries],
             "task": [asdict(entry) for entry in self.task],
+            "gradients": [asdict(entry) for entry in self.gradients],
             "multipliers": self.source,
             "residual": self.residual,
             "reliable": self.reliable,

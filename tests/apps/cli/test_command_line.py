@@ -48,6 +48,10 @@ def test_examples_work_in_this_order(run, tmp_path, monkeypatch):
     (tmp_path / "lines.yaml").write_text(
         f"sweep: 1\ntask: task.yaml\n{fixed}\ngrid: {{spline.degree: [3, 4]}}\n"
     )
+    (tmp_path / "cell.yaml").write_text(
+        "brachis: 1\nrobot: {urdf: scara3}\nstart: free\npath_start: [1.5, -0.3]\ntask_space: [x, y]\n"
+        "path: [{line: {by: [0, 0.6]}}]\nspline: {intervals: 8}\nsearch: {effort: single}\n"
+    )
     assert set(EXAMPLES) == set(COMMANDS)
     general = re.findall(r"^  (brachis .*?) +#", GROUP.epilog, re.MULTILINE)
     assert len(general) == 2
@@ -83,7 +87,10 @@ def test_help_of_plot_lists_every_figure(run):
 
 @pytest.mark.parametrize(
     "words, expected",
-    [("brachis pl", ["plan", "plot"]), ("brachis plan --s", ["--set", "--strict"])],
+    [
+        ("brachis pl", ["plan", "plot", "place"]),
+        ("brachis plan --s", ["--set", "--strict"]),
+    ],
 )
 def test_completion(words, expected):
     last = str(len(words.split()) - 1)
@@ -99,7 +106,7 @@ TASK = ROOT / "examples/01_scara_line.yaml"
 WRONG = [
     (
         "plna task.yaml",
-        r"no such command 'plna'.*Did you mean 'plan'\?.*see brachis --help",
+        r"no such command 'plna'.*Did you mean 'plan', 'place'\?.*see brachis --help",
     ),
     (f"{TASK}", "a command comes before a file: brachis plan "),
     (f"{SCARA}", "a command comes before a file: brachis inspect "),

@@ -179,6 +179,17 @@ def write_one(
         return write(out)
 
 
+def check_new(out: Path | None) -> None:
+    """Refuse an output file that exists."""
+    if out is not None and (is_file(out) or is_folder(out)):
+        raise InputError(
+            "the file exists",
+            where=str(out),
+            allowed="a new file",
+            hint="Choose another name with --out",
+        )
+
+
 def write_text(text: str, path: Path) -> None:
     """Write a text file completely or not at all."""
     with atomic_write(path) as stream:

@@ -49,6 +49,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     starting.compose,
     recordings.import_,
     recordings.compare,
+    planning.place,
     planning.sweep,
     motions.schema,
 )

@@ -1,8 +1,12 @@
-"""``brachis plan | bottleneck | sweep``: plan a task, find out what slows the motion down, plan a task many times."""
+"""``brachis plan | bottleneck | place | sweep``.
+
+Plan a task, find out what slows the motion down, move the workpiece or the base, plan a task many times.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,12 +27,14 @@ from brachis.apps.cli.app import (
 from brachis.apps.cli.folder import (
     Drawing,
     Writer,
+    check_new,
     draw,
     end_cleanly,
     exit_code,
     finish,
     output_folder,
     write_files,
+    write_text,
 )
 from brachis.apps.cli.motions import show
 from brachis.apps.cli.output import (
@@ -252,6 +258,80 @@ def bottleneck(
         complaint="its bottlenecks may be wrong",
     )
     raise typer.Exit(code)
+
+
+def place(
+    task: Annotated[Path, Argument(metavar="TASK")],
+    move: str = "workpiece",
+    ranges: Annotated[
+        list[str] | None, Option("--range", metavar="NAME=FROM,TO")
+    ] = None,
+    starts: int = 4,
+    steps: int = 8,
+    jobs: int = 1,
+    gradients: Annotated[bool, Option("--gradients")] = False,
+    out: Path | None = None,
+    changes: Changes = None,
+    json: Json = False,
+) -> None:
+    """Move a workpiece or the base to where the motion is faster.
+
+    Parameters
+    ----------
+    task : path
+        Task file (YAML).
+    move : str, optional
+        Name of a frame of the task, base, or workpiece for the frame of all paths. Bodies in the frame move with it.
+    ranges : list of str
+        Smallest and largest change of a coordinate: x, y or z along the axes of the world, m, or roll_deg, pitch_deg or
+        yaw_deg about them, degrees. The option can be repeated.
+    starts : int, optional
+        Number of places that are tried first.
+    steps : int, optional
+        Maximum number of steps from each of the best two places.
+    jobs : int, optional
+        Number of processes for the first places.
+    gradients : bool, optional
+        Only plan the task, and print the derivatives of the end time with respect to all placements, the payload and
+        the process speeds.
+    out : path, optional
+        File for the changed task. The file must not exist yet.
+
+    Examples
+    --------
+    brachis place cell.yaml --gradients
+    brachis place cell.yaml --range x=-0.2,0.2 --range yaw_deg=-30,30 --out moved.yaml
+    brachis place cell.yaml --move base --range z=0,0.4
+    """
+    from brachis.apps.place import read_range, write_task
+
+    check_new(out)
+    limits = dict(read_range(text) for text in ranges or ())
+    with end_cleanly(), show_progress() as listener:
+        if gradients:
+            before, _ = _plan_task(task, None, changes, None, listener)
+            after = before
+            data: dict[str, Any] = {"t_end": before.t_end}
+        else:
+            loaded = load_changed_task(task, read_changes(changes))
+            options: dict[str, Any] = {"starts": starts, "steps": steps, "jobs": jobs}
+            placing = brachis.place(
+                loaded, move=move, ranges=limits, listener=listener, **options
+            )
+            after = placing.after
+            data = placing.to_dict()
+    entries = after.gradients
+    data["gradients"] = [asdict(entry) for entry in entries]
+    if out is not None and not gradients:
+        write_text(write_task(placing.task), out)
+    if json:
+        print_json(data)
+    else:
+        if not gradients:
+            print_table("placement", ("", ""), placing.summary().items())
+        rows = [entry.row for entry in entries]
+        print_table("gradients", ("what", "change", "derivative of t_E"), rows)
+    raise typer.Exit(0 if after.verified else 1)
 
 
 def sweep(

@@ -10,7 +10,7 @@ from typer import Argument, Option
 
 import brachis
 from brachis.apps.cli.app import Json, urdf_of
-from brachis.apps.cli.folder import write_one, write_text
+from brachis.apps.cli.folder import check_new, write_one, write_text
 from brachis.apps.cli.output import (
     print_answer,
     print_json,
@@ -18,8 +18,6 @@ from brachis.apps.cli.output import (
     print_table,
     show_progress,
 )
-from brachis.common.files import is_file, is_folder
-from brachis.errors import InputError
 
 
 def robots(json: Json = False) -> None:
@@ -79,13 +77,7 @@ def new(
     """
     from brachis.apps.starter import starter_task
 
-    if is_file(out) or is_folder(out):
-        raise InputError(
-            "the file exists",
-            where=str(out),
-            allowed="a new file",
-            hint="Choose another name with --out",
-        )
+    check_new(out)
     with show_progress() as listener:
         starter = starter_task(
             urdf_of(urdf),

@@ -42,6 +42,8 @@ class ReportedMotion:
         When each limit is active. Limits that are active longest come first.
     held_back : tuple of str
         Sentences that say what slows the motion down.
+    gradients : tuple of (str, str, str)
+        Rows of a table of the derivatives of the end time with respect to placements, payload and process speeds.
     remarks : tuple of Issue
         Implausible values found in the robot and the task.
     guarantees : dict of str to str
@@ -63,6 +65,7 @@ class ReportedMotion:
     ratios: LimitRatios
     saturations: tuple[Saturation, ...]
     held_back: tuple[str, ...]
+    gradients: tuple[tuple[str, str, str], ...]
     remarks: tuple[Issue, ...]
     guarantees: dict[str, str]
     degrees: bool
@@ -95,6 +98,8 @@ def reported_motion(
         report = bottleneck.report(motion, solve=False)
         unknown = [f"The cost of the limits is unknown: {error}"]
     held_back = (*report.text(degrees=degrees).splitlines(), *unknown)
+    costs = report.sensitivities
+    gradients = () if costs is None else costs.gradients
     samples = dense_samples(trajectory)
     rows = joint_rows_of(trajectory)
     return ReportedMotion(
@@ -104,6 +109,7 @@ def reported_motion(
         ratios=ratios,
         saturations=report.saturations,
         held_back=held_back,
+        gradients=tuple(gradient.row for gradient in gradients),
         guarantees=describe_guarantees(limits),
         degrees=degrees,
         **known,

@@ -1,0 +1,39 @@
+"""``brachis place``: what it prints and writes."""
+
+import json
+import re
+
+import pytest
+
+import brachis
+
+TASK = {
+    "brachis": 1,
+    "robot": {"urdf": "scara3"},
+    "start": "free",
+    "path_start": [1.5, -0.3],
+    "path": [{"line": {"by": [0.0, 0.6]}}],
+    "task_space": ["x", "y"],
+}
+
+
+def test_a_faster_place_is_printed_and_written(run, write, tmp_path):
+    out = tmp_path / "moved.yaml"
+    command = f"place {write(TASK)} --range x=-0.2,0.2 --starts 1 --steps 1 --out {out}"
+    text = run(*command.split()).out
+    before, after = re.findall(r"end time (?:before|after)\W+(\S+) s", text)
+    assert float(after) < float(before)
+    assert re.search(r"base\W+yaw\W+\S+ s/rad", text)
+    assert brachis.load_task(out).frames["workpiece"].xyz[0] != 0.0
+    again = run(*command.split(), code=2)
+    assert "the file exists" in again.err
+
+
+def test_gradients_alone(run, write):
+    data = json.loads(run(f"place {write(TASK)} --gradients --json").out)
+    by_figure = {
+        (entry["subject"], entry["figure"]): entry["derivative"]
+        for entry in data["gradients"]
+    }
+    assert by_figure["path", "x"] == pytest.approx(-by_figure["base", "x"], rel=1e-6)
+    assert by_figure["payload", "mass"] > 0.0

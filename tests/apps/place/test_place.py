@@ -1,0 +1,107 @@
+"""Moving a workpiece or the base: what is found, what is written, what is refused."""
+
+import pytest
+
+import brachis
+from brachis.apps.place import read_range, write_task
+from brachis.errors import InputError, UnknownNameError
+
+TASK = {
+    "brachis": 1,
+    "robot": {"urdf": "scara3"},
+    "start": "free",
+    "path_start": [1.5, -0.3],
+    "path": [{"line": {"by": [0.0, 0.6]}}],
+    "task_space": ["x", "y"],
+}
+RANGES = {"x": (-0.4, 0.2), "yaw_deg": (-30.0, 30.0)}
+
+
+def tool_at_start(result):
+    """Position of the tool where the motion begins, m."""
+    trajectory = result.trajectory
+    return trajectory.robot.tool_placement(trajectory.q[0]).translation
+
+
+@pytest.fixture(scope="module")
+def placing():
+    return brachis.place(TASK, ranges=RANGES, starts=3, steps=3)
+
+
+def test_a_poor_place_becomes_faster(placing):
+    assert placing.gain > 0.1
+    assert placing.after.verified
+    assert placing.after.t_end == min(trial.t_end for trial in placing.trials)
+
+
+def test_the_change_stays_in_its_ranges(placing):
+    assert list(placing.change) == list(RANGES)
+    for trial in placing.trials:
+        for name, (low, high) in RANGES.items():
+            assert low <= trial.change[name] <= high
+
+
+def test_the_written_task_has_the_faster_motion(placing, tmp_path):
+    file = tmp_path / "moved.yaml"
+    file.write_text(write_task(placing.task))
+    task = brachis.load_task(file)
+    assert task == placing.task
+    assert task.path_frame == "workpiece"
+    again = brachis.plan(task, start_from=placing.after)
+    assert again.t_end == pytest.approx(placing.after.t_end, rel=0.01)
+
+
+def test_the_path_turns_about_its_beginning(placing):
+    first = tool_at_start(placing.after)
+    assert first[0] == pytest.approx(1.5 + placing.change["x"], abs=1e-6)
+    assert first[1] == pytest.approx(-0.3, abs=1e-6)
+
+
+def test_the_base_moves_while_the_path_stays():
+    placing = brachis.place(
+        TASK, move="base", ranges={"x": (0.0, 0.3)}, starts=1, steps=2
+    )
+    first = tool_at_start(placing.after)
+    assert first[:2] == pytest.approx([1.5, -0.3], abs=1e-6)
+    assert placing.task.robot.mounting.xyz[0] == placing.change["x"] > 0.0
+    assert placing.gain > 0.02
+
+
+def test_places_out_of_reach_are_passed_over():
+    placing = brachis.place(TASK, ranges={"x": (-0.1, 4.0)}, starts=4, steps=0)
+    times = [trial.t_end for trial in placing.trials]
+    assert max(times) == float("inf")
+    assert placing.after.verified
+    assert len(placing.to_dict()["trials"]) < len(times)
+
+
+def test_what_cannot_be_moved_is_refused():
+    held = {**TASK, "start": {"joints": [0.3, -1.0, 1.0]}}
+    del held["path_start"]
+    with pytest.raises(InputError, match="given posture"):
+        brachis.place(held, ranges=RANGES)
+    with pytest.raises(UnknownNameError, match="frame"):
+        brachis.place(TASK, move="table", ranges=RANGES)
+    with pytest.raises(InputError, match="no range"):
+        brachis.place(TASK, ranges={})
+    with pytest.raises(UnknownNameError, match="coordinate"):
+        brachis.place(TASK, ranges={"yaw": (0.0, 1.0)})
+    with pytest.raises(InputError, match="not a range"):
+        brachis.place(TASK, ranges={"x": (1.0, 1.0)})
+    with pytest.raises(InputError, match="not a range"):
+        read_range("x=3")
+
+
+def test_paths_in_two_frames_have_no_common_workpiece():
+    frames = {"left": {"xyz": [1.2, 0.0, 0.0]}, "right": {"xyz": [1.0, -0.5, 0.0]}}
+    parts = [
+        {
+            "path": {"frame": name, "segments": [{"line": {"by": [0.0, 0.2]}}]},
+            "path_start": [0.0, 0.0],
+        }
+        for name in frames
+    ]
+    task = {key: TASK[key] for key in ("brachis", "robot", "task_space", "start")}
+    task |= {"frames": frames, "program": [parts[0], {"move": "next"}, parts[1]]}
+    with pytest.raises(InputError, match="several frames"):
+        brachis.place(task, ranges=RANGES)
