@@ -104,7 +104,7 @@ def test_a_change_of_a_posture_moves_start_and_path():
             {"path": [brachis.Line(to_posture="free")]},
             r"path\[0\]\.line\.to_posture: this posture is not .*allowed: home, away",
         ),
-        ({"postures": {"free": HOME, "away": AWAY, "home": HOME}}, r"postures: free cannot be"),
+        ({"postures": {"free": HOME, "away": AWAY, "home": HOME}}, r"postures: free, start and next cannot be"),
         (
             {"path": [{"line": {"to_posture": "home"}, "orientation": "fixed"}]},
             r"path\[0\]\.orientation: the line already has orientations",
