@@ -66,7 +66,7 @@ Each table comes from a file in `benchmarks/results`, which the script named abo
 ## How long a plan takes
 
 `python3 tasks.py bench` measures these times. Plans have 20 intervals, and are refined and verified unless the row says
-otherwise. The virtual machine was fast at that time; when it is slow, plans take three times as long.
+otherwise. On a slow day of the virtual machine they take three times as long.
 
 | what | planar arm (j1, j2, j3) | TX90L on its rail |
 |---|---|---|

@@ -71,3 +71,27 @@ def test_a_cell_with_a_positioner():
         away = data.xpos[tool] - data.xpos[workpiece]
         seen = data.xmat[workpiece].reshape(3, 3).T @ away
         np.testing.assert_allclose(seen, positions[k], atol=1e-9)
+
+
+def test_a_closed_cycle_does_not_drift():
+    """Three times through a program of two lines, which ends where it began."""
+    program = [
+        {"path": [{"line": {"by": [0.0, 0.3]}}], "path_start": [0.7, -0.1]},
+        {"dwell": 0.1},
+        {"move": "next"},
+        {"path": [{"line": {"by": [0.2, 0.0]}}], "path_start": [0.6, 0.5]},
+        {"move": "next"},
+    ]
+    result = brachis.plan(
+        "scara3", program=program, task_space=["x", "y"], end="start", **QUICK
+    )
+    assert result.verified
+    trajectory = result.trajectory
+    model, order = mujoco_model(trajectory.robot)
+    tool = model.body(trajectory.robot.tool_frame).id
+    steps = int(trajectory.t_end / 2e-4)
+    t = np.arange(3 * steps + 1) * (trajectory.t_end / steps)
+    states = follow(trajectory, model, order, t)
+    places = np.array([data.xpos[tool].copy() for data, _ in states])
+    begins = places[::steps]
+    assert np.linalg.norm(begins - begins[0], axis=1).max() < 1e-6

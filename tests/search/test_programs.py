@@ -17,6 +17,7 @@ from brachis.optimise.phase_timing import PhaseTiming
 from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for
 from brachis.search.order import find_orders
+from brachis.task import scene_during
 from support.effort import QUICK
 from support.slides import X, slides
 
@@ -196,6 +197,57 @@ def test_limits_of_a_part_hold_in_it_alone(slide):
     first, second = (part.duration for part in result.trajectory.parts)
     assert first == pytest.approx(0.5 / 0.5 + 0.5 * MASS / FORCE, rel=1e-3)
     assert second == pytest.approx(least_time(0.5), rel=1e-3)
+
+
+def test_two_paths_with_different_limits_meet(slide):
+    parts = [
+        {"path": [{"line": {"by": [0.5]}}], "limits": {"velocity": 0.5}},
+        {"path": [{"line": {"by": [0.3]}}]},
+    ]
+    result = plan_slide(slide, parts, task_space=["x"], start=[0.0])
+    assert result.verified
+    slow, fast = (part.duration for part in result.trajectory.parts)
+    assert slow == pytest.approx(0.5 / 0.5 + 0.5 * MASS / FORCE, rel=1e-3)
+    assert fast == pytest.approx(least_time(0.3), rel=1e-3)
+
+
+def test_a_given_speed_is_held_in_a_program():
+    seam = {
+        "path": [{"line": {"by": [0.0, 0.4]}, "speed": 0.5}],
+        "path_start": [0.3, 0.2],
+        "name": "seam",
+    }
+    home = {"move": {"joints": [0.0, 0.0]}}
+    keys = {"start": [0.0, 0.0], "end": "start", "task_space": ["x", "y"]}
+    program = [{"move": "next"}, seam, home]
+    result = brachis.plan("gantry2", program=program, **keys, **QUICK)
+    assert result.verified
+    begin, component = result.trajectory.components[1]
+    held = [phase for phase in component.phases if phase.speed]
+    assert [phase.speed for phase in held] == [0.5]
+    t = np.linspace(held[0].begin, held[0].end, 21)
+    # The joints of a gantry are the coordinates of its tool.
+    speeds = np.linalg.norm(result.trajectory.velocity(begin + t), axis=1)
+    np.testing.assert_allclose(speeds, 0.5, rtol=1e-6)
+
+
+def test_bodies_are_there_between_their_parts():
+    parts = brachis.Program(
+        [{"move": "next"}, {**SEAM, "name": "lower"}, {"dwell": 0.1, "name": "grip"}]
+    )
+    ball = {"name": "ball", "sphere": 0.1}
+    lives = [{}, {"until": "lower"}, {"since": "lower"}, {"since": "grip"}]
+    scene = [
+        brachis.Sphere(0.1, name=f"ball {number}").model_copy(update=life)
+        for number, life in enumerate(lives)
+    ]
+    there = [
+        [int(body.name[-1]) for body in scene_during(scene, parts, number)]
+        for number in range(3)
+    ]
+    assert there == [[0, 1], [0, 2], [0, 2, 3]]
+    with pytest.raises(TaskError, match="this part is not defined"):
+        brachis.plan("iiwa14", **CYCLE, scene=[{**ball, "until": "nowhere"}])
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,7 @@ def bind_task(
     begins = [task.start, *ends[:-1]]
     for way, *postures in zip(ways, begins, ends, strict=True):
         changed = _robot_of(robot, way)
-        before = problems[-1].path if problems else None
+        before = problems[-1] if problems else None
         stated = dict(zip(("start", "end"), postures, strict=True))
         part_task = _task_of(way, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
@@ -176,10 +176,10 @@ def _task_of(
     way: _Way,
     robot: Robot,
     task: Task,
-    before: Path | None,
+    before: Problem | None,
     stated: Mapping[str, Posture | str],
 ) -> Task:
-    """Return the task of a way. `before` is the path of the way before, `stated` are the postures at both ends."""
+    """Return the task of a way. `before` is the problem of the way before, `stated` are the postures at both ends."""
     if not way.of(LimitedPart):
         raise TaskError(
             "the payload or the scene changes between a path and its approach or retract",
@@ -201,8 +201,8 @@ def _task_of(
     segments = _segments(way)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})
     changes["path"] = (*segments[:-1], ending)
-    if changes["path_start"] is None and before is not None and before.positions:
-        changes["path_start"] = _pose(before, 1.0)
+    if changes["path_start"] is None and before is not None:
+        changes["path_start"] = _end_of(before, changes)
     approaches = way.of(ApproachPart)
     retracts = way.of(RetractPart)
     if approaches or retracts:
@@ -221,6 +221,21 @@ def _task_of(
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
     return validate(Task, task.model_copy(update=changes), way.key)
+
+
+def _end_of(
+    before: Problem, keys: Mapping[str, Any]
+) -> ToolPose | tuple[float, ...] | None:
+    """Return the end of the path before, if it has the same coordinates as a path with certain keys."""
+    if any(
+        getattr(before.task, key) != keys[key] for key in ("task_space", "path_frame")
+    ):
+        return None
+    (target,) = before.path.sample(np.ones(1)).target
+    if len(target) == _PLACES + 9:
+        return _pose(before.path, 1.0)
+    frame = before.path.frame
+    return tuple((target if frame is None else frame.to_frame(target)).tolist())
 
 
 def _segments(way: _Way) -> list[SegmentModel]:
