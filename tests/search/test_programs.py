@@ -246,7 +246,7 @@ def test_bodies_are_there_between_their_parts():
         for number in range(3)
     ]
     assert there == [[0, 1], [0, 2], [0, 2, 3]]
-    with pytest.raises(TaskError, match="this part is not defined"):
+    with pytest.raises(TaskError, match="no part of the program has this name"):
         brachis.plan("iiwa14", **CYCLE, scene=[{**ball, "until": "nowhere"}])
 
 

@@ -76,7 +76,7 @@ def compose(problem: Problem, trajectories: Sequence[Trajectory]) -> Trajectory:
         components.append((begin, trajectory))
         begin += trajectory.t_end + part.legs[-1].dwell
     composed = _compose(problem, components, begin)
-    sections = list(_time_sections(problem, components, begin))
+    sections = list(_time_sections(problem, components))
     events = [
         Event(mark.name, (part.begin if mark.at == "start" else part.end) - mark.lead)
         for section, part in sections
@@ -90,26 +90,24 @@ def compose(problem: Problem, trajectories: Sequence[Trajectory]) -> Trajectory:
 
 
 def _time_sections(
-    problem: Problem, components: Sequence[tuple[float, Trajectory]], end: float
+    problem: Problem, components: Sequence[tuple[float, Trajectory]]
 ) -> Iterator[tuple[Section, MotionPart]]:
     """Yield the sections of all parts of a problem, with their times."""
     assert isinstance(problem, ProblemChain)
-    ends = [*(begin for begin, _ in components[1:]), end]
-    triples = zip(problem.sections, components, ends, strict=True)
-    for sections, (first, component), last_end in triples:
+    for sections, (first, component) in zip(problem.sections, components, strict=True):
         begin = first
-        for number, section in enumerate(sections):
+        for section in sections:
             reached = [
                 phase.end
                 for phase in component.phases
                 if abs(phase.s_end - section.s_end) < tolerances.PATH
-                and (section.kind == "dwell" or not phase.is_dwell)
+                and not phase.is_dwell
             ]
-            section_end = first + max(reached)
-            if section.kind == "dwell" and number == len(sections) - 1:
-                section_end = last_end
-            yield section, MotionPart(section.name, section.kind, begin, section_end)
-            begin = section_end
+            end = first + max(reached)
+            if section.kind == "dwell":
+                end = begin + section.dwell
+            yield section, MotionPart(section.name, section.kind, begin, end)
+            begin = end
 
 
 def _compose(

@@ -23,12 +23,15 @@ class Section:
         Path coordinate at its end; that of the section before if it is a dwell.
     marks : tuple of Mark
         Its events.
+    dwell : float
+        Duration of a dwell, s.
     """
 
     name: str
     kind: str
     s_end: float
     marks: tuple[Mark, ...]
+    dwell: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.errors import PathError, TaskError
 from brachis.path import Path, path_of
 from brachis.path.rotations import rotation_of
@@ -27,7 +28,9 @@ from brachis.task import (
     PayloadPart,
     Posture,
     RetractPart,
+    SpeedTable,
     Task,
+    ToolLimits,
     name_of,
     path_keys,
     scene_during,
@@ -67,9 +70,20 @@ def bind_task(
         stated = dict(zip(("start", "end"), postures, strict=True))
         part_task = _task_of(way, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
+        if before is not None:
+            _check_meet(before, problem, way)
         problems.append(problem)
         sections.append(list(_sections(way, problem)))
     is_closed = task.end == "start" and task.start == "free"
+    if is_closed:
+        _check_meet(problems[-1], problems[0], ways[0])
+    for way, problem in zip(ways, problems, strict=True):
+        if any(limit.guarantee.is_mean for limit in problem.limits):
+            raise TaskError(
+                "a program cannot have limits on means over its time",
+                where=f"{way.key}, robot.limits.rms_torque",
+                allowed="no such limit; verify the motion of the program against it",
+            )
     waits = [way.wait for way in ways]
     return ProblemChain.of_parts(whole, problems, waits, sections, is_closed=is_closed)
 
@@ -119,7 +133,18 @@ class _Way:
         paths = self.of(PathPart)
         if not isinstance(part, PathPart) or self.of(MovePart):
             return False
-        return not paths or _settings(paths[-1]) == _settings(part)
+        if not paths:
+            return True
+        # A path that states where it begins may not begin where the one before ends.
+        is_same = part.path_start is None and _settings(paths[-1]) == _settings(part)
+        return is_same and not _has_places(part.tool_limits)
+
+
+def _has_places(limits: ToolLimits | None) -> bool:
+    """Tell whether limits on the tool state values of s, which are those of a path alone."""
+    if limits is None:
+        return False
+    return bool(limits.process_speed) or isinstance(limits.speed, SpeedTable)
 
 
 def _settings(part: PathPart) -> dict[str, Any]:
@@ -192,6 +217,8 @@ def _task_of(
         "order": "given",
         "robot": robot.settings,
         "scene": way.scene,
+        # A scene may be empty during a part: the mode is that of the whole program.
+        "collisions": task.collisions.model_copy(update={"mode": task.collision_mode}),
         **stated,
         "tool_limits": limited.tool_limits or task.tool_limits,
     }
@@ -205,6 +232,12 @@ def _task_of(
         changes["path_start"] = _end_of(before, changes)
     approaches = way.of(ApproachPart)
     retracts = way.of(RetractPart)
+    if (approaches or retracts) and _has_places(limited.tool_limits):
+        raise TaskError(
+            "with an approach or a retract, values of s are not those of the path alone",
+            where=f"{way.key}.tool_limits",
+            allowed="speed in the segments of the path",
+        )
     if approaches or retracts:
         free = {"end": "free", "start": "free" if approaches else stated["start"]}
         plain = task.model_copy(update=changes | free)
@@ -213,7 +246,7 @@ def _task_of(
         if approaches:
             changes["path_start"] = _pose(path, 0.0, approaches[0].approach, way)
             to = tuple(_pose(path, 0.0).position)
-            line = LineSegment(line=LineTo(to=to), stop=True)
+            line = LineSegment(line=LineTo(to=to), stop=True, dwell=_first_wait(way))
             changes["path"] = (line, *changes["path"])
         if retracts:
             away = _pose(path, 1.0, retracts[0].retract, way)
@@ -221,6 +254,23 @@ def _task_of(
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
     return validate(Task, task.model_copy(update=changes), way.key)
+
+
+def _check_meet(before: Problem, after: Problem, way: _Way) -> None:
+    """Refuse two paths that do not meet, with no move between them."""
+    (last,) = before.path.sample(np.ones(1)).target
+    (first,) = after.path.sample(np.zeros(1)).target
+    if len(last) != len(first) or not len(first):
+        return
+    miss = float(np.abs(after.task_map.difference(first, last)).max())
+    if miss > tolerances.WRITTEN:
+        raise PathError(
+            "the path does not begin where the path before ends",
+            where=f"{way.key}.path_start",
+            found=f"{miss:.3g} m or rad apart",
+            allowed=f"at most {tolerances.WRITTEN:g}",
+            hint="Put {move: next} between them",
+        )
 
 
 def _end_of(
@@ -247,10 +297,20 @@ def _segments(way: _Way) -> list[SegmentModel]:
             if segments:
                 segments[-1] = segments[-1].model_copy(update={"stop": True})
             segments += part.path
-        elif isinstance(part, DwellPart) and number < last:
+        elif isinstance(part, DwellPart) and segments and number < last:
             waits = {"stop": True, "dwell": segments[-1].dwell + part.dwell}
             segments[-1] = segments[-1].model_copy(update=waits)
     return segments
+
+
+def _first_wait(way: _Way) -> float:
+    """Return the time for which the arm waits between the approach and the path, s."""
+    total = 0.0
+    for _, part in way.parts:
+        if isinstance(part, PathPart):
+            break
+        total += part.dwell if isinstance(part, DwellPart) else 0.0
+    return total
 
 
 def _pose(path: Path, s: float, back: float = 0.0, way: _Way | None = None) -> ToolPose:
@@ -293,4 +353,6 @@ def _sections(way: _Way, problem: Problem) -> Iterator[Section]:
             s_end = (
                 1.0 if is_last else float(problem.path.stops[stopping.index(count - 1)])
             )
-        yield Section(name_of(part, number + 1), part.kind, s_end, part.events)
+        dwell = part.dwell if isinstance(part, DwellPart) else 0.0
+        name = name_of(part, number + 1)
+        yield Section(name, part.kind, s_end, part.events, dwell)

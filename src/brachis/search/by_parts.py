@@ -16,6 +16,7 @@ from brachis.optimise.extraction import compose
 from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
+from brachis.problem.chain import ProblemChain
 from brachis.problem.problem import Problem
 from brachis.search.stages import (
     Candidate,
@@ -53,14 +54,20 @@ def finish_by_parts(candidate: RankedCandidate, finish: Finish) -> Candidate:
     guess = candidate.guess
     assert isinstance(guess, ChainGuess)
     finished: list[FinishedCandidate] = []
-    for part, problem in zip(guess.parts, _between_postures(guess), strict=True):
+    problems = _between_postures(guess)
+    for part, problem in zip(guess.parts, problems, strict=True):
         alone = replace(part, problem=problem, solver=guess.solver)
         outcome = finish(rank(alone, program_of(problem, alone.maps_by_leg())))
         if not isinstance(outcome, FinishedCandidate):
             return fail(candidate, outcome.status, outcome.reports)
         finished.append(outcome)
     motion = compose(guess.problem, [outcome.trajectory for outcome in finished])
-    return verify(candidate, candidate.reports, _together(finished), motion)
+    # The program that explains the motion has the postures in which the parts meet as given ones.
+    chain = guess.problem
+    assert isinstance(chain, ProblemChain)
+    chain = replace(chain, chained=tuple(problems))
+    known = replace(candidate, guess=replace(guess, problem=chain))
+    return verify(known, candidate.reports, _together(finished), motion)
 
 
 def _between_postures(guess: ChainGuess) -> list[Problem]:

@@ -27,6 +27,7 @@ from brachis.task.fields import (
     Version,
     check_defined,
     must,
+    refuse,
 )
 from brachis.task.limit_models import ToolLimits
 from brachis.task.orientation import StartPlace, ToolPose
@@ -226,8 +227,13 @@ class Task(CheckedModel):
     def _mistakes(self) -> Iterator[Mistake]:
         self._check_names()
         if self.task_space == "free":
-            yield from self._changed(_OF_PATHS, "a move has no path")
-            yield from find_mistakes(self.program, self.order)
+            why = "a move has no path"
+            if self.program:
+                why = "a program states its paths in its parts"
+            yield from self._changed(_OF_PATHS, why)
+            yield from find_mistakes(
+                self.program, self.order, self.start, self.end, self.postures
+            )
         elif self.path:
             yield from self._mistakes_at_the_start()
             yield from self._mistakes_in_the_path()
@@ -263,7 +269,16 @@ class Task(CheckedModel):
             for i, body in enumerate(self.scene)
             for key in ("since", "until")
         }
-        check_defined("part", lives, part_names(self.program))
+        names = part_names(self.program) if self.order == "given" else []
+        for key, name in lives.items():
+            if name is not None and name not in names:
+                raise refuse(
+                    "no part of the program has this name",
+                    key=key,
+                    found=name,
+                    allowed=", ".join(names)
+                    or "null: only a program in a given order has times",
+                )
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]
@@ -331,7 +346,8 @@ class Task(CheckedModel):
         """Refuse keys, given by their defaults, that this task space does not have."""
         for key, default in defaults.items():
             if attrgetter(key)(self) != default:
-                yield key, why, f"no such key with task_space: {self.task_space}"
+                beside = "program" if self.program else f"task_space: {self.task_space}"
+                yield key, why, f"no such key beside {beside}"
 
     def _mistakes_in_tolerances(self) -> Iterator[Mistake]:
         tolerances = self.tolerances

@@ -47,7 +47,7 @@ class Mark(Model):
     """Name of the event."""
     at: Literal["start", "end"] = "start"
     """End of the part at which the event occurs."""
-    lead: Number = 0.0
+    lead: Annotated[Number, Field(ge=-10.0, le=10.0)] = 0.0
     """Time by which the event comes earlier, s; later if negative."""
 
 
@@ -250,11 +250,72 @@ _MOST_FREE = 12
 """Maximum number of paths whose order is free."""
 
 
-def find_mistakes(parts: Sequence[Part], order: str) -> Iterator[Mistake]:
-    """Yield the mistakes in the order of a program's parts."""
+def find_mistakes(
+    parts: Sequence[Part],
+    order: str,
+    start: object,
+    end: object,
+    postures: Mapping[str, object],
+) -> Iterator[Mistake]:
+    """Yield the mistakes in a program's parts and in the postures at both ends."""
+    yield from _find_wrong_names(parts)
     if order == "free":
         yield from _find_mistakes_if_free(parts)
         return
+    yield from _find_wrong_order(parts)
+    ways = [part for part in parts if part.kind in _WAYS]
+    if ways and isinstance(ways[-1], MovePart):
+        yield from _find_wrong_end(ways, start, end, postures)
+
+
+def joints_of(posture: object, postures: Mapping[str, object]) -> object:
+    """Return the joint positions of a posture or of the name of one."""
+    if isinstance(posture, Posture):
+        return posture.joints
+    return postures.get(str(posture), posture)
+
+
+def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
+    """Yield names that occur twice, and events that have no time."""
+    names = part_names(parts)
+    for number, part in enumerate(parts):
+        if names.index(names[number]) < number:
+            yield f"program[{number}].name", "two parts have this name", "another name"
+        if part.events and isinstance(part, PayloadPart):
+            yield (
+                f"program[{number}].events",
+                "a change of the payload takes no time",
+                "events of the part before or after",
+            )
+
+
+def _find_wrong_end(
+    ways: Sequence[Part], start: object, end: object, postures: Mapping[str, object]
+) -> Iterator[Mistake]:
+    """Yield the mistakes at the end of a program that ends with a move."""
+    goal = getattr(ways[-1], "move", None)
+    begins_anywhere = getattr(ways[0], "move", None) == NEXT and start == "free"
+    if goal == NEXT and end == "free":
+        yield (
+            "program",
+            "the last move leads to a posture that nothing determines",
+            "a posture in this move, or end",
+        )
+    elif goal == NEXT and end == "start" and begins_anywhere:
+        yield (
+            "program",
+            "the last move meets the first one in a posture that nothing determines",
+            "a start posture, or a program that begins with a path",
+        )
+    elif goal != NEXT and end != "free":
+        stated = start if end == "start" else end
+        if joints_of(goal, postures) == joints_of(stated, postures):
+            return
+        yield "end", "the last move leads to another posture", "free, or that posture"
+
+
+def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
+    """Yield the mistakes in the order of parts."""
     kinds = [part.kind for part in parts if part.kind in _WAYS]
     numbers = [i for i, part in enumerate(parts) if part.kind in _WAYS]
     for number, before, kind, after in zip(
@@ -286,8 +347,14 @@ def find_mistakes(parts: Sequence[Part], order: str) -> Iterator[Mistake]:
                 "two moves meet in a posture that nothing determines",
                 "a posture, or a path after the move",
             )
+        if isinstance(part, MovePart) and before == "move":
+            earlier = parts[numbers[numbers.index(number) - 1]]
+            if getattr(earlier, "move", None) == part.move:
+                yield f"{key}.move", "the arm is in this posture", "another posture"
     if parts and not kinds:
         yield "program", "nothing moves", "at least one path or move"
+    elif parts and parts[0].kind == "dwell":
+        yield "program[0]", "the arm waits before it has moved", "a path or move first"
 
 
 def _find_mistakes_if_free(parts: Sequence[Part]) -> Iterator[Mistake]:

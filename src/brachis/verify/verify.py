@@ -158,23 +158,28 @@ def _verify_program(
         )
         verified.append(part)
         for check in part.checks:
-            before = worst.get(check.name)
-            if before is None or check.share > before.share:
-                worst[check.name] = place_in_program(trajectory, begin, check)
+            _keep_worse(worst, place_in_program(trajectory, begin, check))
     whole = [
         _check_components(motion),
         *check_progress(motion),
         *check_ends(motion),
         *check_continuity(motion),
     ]
-    whole += _check_closure(motion)
-    checks = worst | {check.name: check for check in whole}
+    for check in (*whole, *_check_closure(motion)):
+        _keep_worse(worst, check)
     return Verification(
-        tuple(checks.values()),
+        tuple(worst.values()),
         sum(part.points for part in verified),
         max(part.worst_ratio for part in verified),
         max(part.path_error for part in verified),
     )
+
+
+def _keep_worse(worst: dict[str, Check], check: Check) -> None:
+    """Put a check in place of the one with the same name, unless that is at least as bad; NaN is the worst."""
+    before = worst.get(check.name)
+    if before is None or not check.share <= before.share:
+        worst[check.name] = check
 
 
 def _robot_of(component: Trajectory, motion: CheckedMotion) -> Robot:
@@ -196,20 +201,24 @@ def place_in_program(trajectory: Trajectory, begin: float, check: Check) -> Chec
     """Return a check of a component that begins at a time, s, with its time in the whole motion and its part."""
     if not trajectory.parts:
         return check
-    time = begin + (check.time or 0.0)
-    names = (part.name for part in trajectory.parts if part.end >= time)
+    time = begin if check.time is None else begin + check.time
+    names = (part.name for part in trajectory.parts if part.end > time)
     name = next(names, trajectory.parts[-1].name)
     subject = f"{check.subject}, {name}" if check.subject else name
-    return replace(check, time=time, subject=subject)
+    return replace(check, time=None if check.time is None else time, subject=subject)
 
 
 def _check_components(motion: CheckedMotion) -> Check:
     """Check that the whole motion is that of its components, and at rest between them."""
     trajectory = motion.trajectory
     misses = []
-    for begin, part in trajectory.components:
+    begins = [begin for begin, _ in trajectory.components[1:]]
+    triples = zip(trajectory.components, [*begins, trajectory.t_end], strict=True)
+    for (begin, part), next_begin in triples:
         joints = trajectory.position(begin + part.times)
         misses.append(np.abs(joints - part.q[:, : joints.shape[1]]).max())
+        waiting = np.linspace(min(begin + part.t_end, next_begin), next_begin, 5)
+        misses.append(np.abs(trajectory.position(waiting) - joints[-1]).max())
     allowed = motion.options.posture_tolerance
     return Check("motion of the parts", max(misses), allowed, "rad, m")
 
