@@ -36,8 +36,8 @@ _TRIED = 6
 _BESIDE = 4
 """Number of the best chains so far to whose ends joint paths of the next path should be close."""
 _AS_FAST = 1.1
-"""Factor on the time of the best chain up to which other chains count as fast. Without it, a program of an UR10 took 1.60
-s in place of 1.31 s."""
+"""Factor on the time of the best chain up to which other chains count as fast. Without it, a program of a UR10 took
+1.60 s in place of 1.31 s."""
 _KEPT = 24
 """Number of chains that are kept at each joint path."""
 _PATHS = 3

@@ -13,7 +13,7 @@ def test_the_distance_is_that_to_the_bodies_of_the_part(cycle):
     tip = {"name": "tip", "sphere": 0.01, "link": "tool", "position": [0, 0, 0.3]}
     names = ("base", "bridge", "tool")
     pairs = [[name, "tip"] for name in names] + [["base", "tool"]]
-    collisions = {"capsules": "auto", "disable": pairs}
+    collisions = {"mode": "avoid", "capsules": "auto", "disable": pairs}
     places = ([0.45, 0.35, 0.3], [2.0, 2.0, 0.3])
     components = []
     for begin, part in cycle.trajectory.components:

@@ -448,10 +448,23 @@ def _find_remedies(run: _Run, period: float) -> Iterator[str]:
         ),
     )
     for text, values, has_passed in changes:
-        index = bisect_left(values, 1, key=has_passed)
+        index = _find_smallest(values, has_passed)
         if index < len(values):
             yield f"the motion passes with {text.format(values[index])}"
     yield "to plan a motion that passes, plan with the profile (--profile)"
+
+
+def _find_smallest(values: Sequence[float], has_passed: Callable[[Any], bool]) -> int:
+    """Return the index of a small change that passes; the number of values if none is found.
+
+    Steps double until a change passes. Larger changes need not pass too: samples fall on other places of the motion.
+    """
+    failed = 0
+    index = 0
+    while index < len(values) and not has_passed(values[index]):
+        failed = index + 1
+        index = 2 * index + 1
+    return bisect_left(values, 1, failed, min(index, len(values)), key=has_passed)
 
 
 def slow_down(motion: Trajectory, factor: float) -> Trajectory:
@@ -460,9 +473,17 @@ def slow_down(motion: Trajectory, factor: float) -> Trajectory:
         (factor * begin, slow_down(component, factor))
         for begin, component in motion.components
     )
+    parts = tuple(
+        replace(part, begin=factor * part.begin, end=factor * part.end)
+        for part in motion.parts
+    )
     return replace(
         motion,
         components=components,
+        parts=parts,
+        events=tuple(
+            replace(event, time=factor * event.time) for event in motion.events
+        ),
         times=motion.times * factor,
         qdot=motion.qdot / factor,
         qddot=motion.qddot / factor**2,
