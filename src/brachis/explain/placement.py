@@ -154,6 +154,7 @@ def _differentiate(motion: OptimalMotion, subject: str, figure: str) -> float | 
     pivot = pivot_of(motion.problem, subject)
 
     def change(step: float) -> Problem:
+        """Return the problem after a step of the coordinate, m or rad."""
         transform = transform_about({figure: step}, pivot)
         return _with_parts(
             motion.problem, lambda part: _move_part(part, subject, transform)
@@ -167,6 +168,7 @@ def _by_mass(motion: OptimalMotion) -> float | None:
     step = _KILOGRAMS * motion.step
 
     def change(difference: float) -> Problem:
+        """Return the problem with a heavier payload, kg."""
         # Both masses are above the present one, so that a first payload has a positive mass.
         added = difference + 1.001 * step
         return _with_parts(motion.problem, lambda part: _load_part(part, added))

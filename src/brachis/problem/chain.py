@@ -38,7 +38,7 @@ class Section:
 class ProblemChain(Problem):
     """A problem whose motion consists of the motions of other problems.
 
-    Its legs, limits and time laws are those of all parts. The arm stops between the parts.
+    Its legs and time laws are those of all parts; the parts have limits of their own. The arm stops between the parts.
 
     Attributes
     ----------

@@ -57,39 +57,41 @@ def bind_task(
     lasting = tuple(body for body in task.scene if body.since == body.until is None)
     whole_task = task.model_copy(update={"scene": lasting})
     whole = replace(Problem.of(robot, whole_task, own_limits), task=task)
-    ways = list(_ways(task) if task.order == "given" else _free_ways(task))
-    ends = [way.end for way in ways]
+    stretches = list(
+        _stretches(task) if task.order == "given" else _free_stretches(task)
+    )
+    ends = [stretch.end for stretch in stretches]
     if ends[-1] == "free":
         ends[-1] = task.start if task.end == "start" else task.end
     problems: list[Problem] = []
     sections: list[list[Section]] = []
     begins = [task.start, *ends[:-1]]
-    for way, *postures in zip(ways, begins, ends, strict=True):
-        changed = _robot_of(robot, way)
+    for stretch, *postures in zip(stretches, begins, ends, strict=True):
+        changed = _robot_of(robot, stretch)
         before = problems[-1] if problems else None
         stated = dict(zip(("start", "end"), postures, strict=True))
-        part_task = _task_of(way, changed, task, before, stated)
+        part_task = _task_of(stretch, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
         if before is not None:
-            _check_meet(before, problem, way)
+            _check_meet(before, problem, stretch)
         problems.append(problem)
-        sections.append(list(_sections(way, problem)))
+        sections.append(list(_sections(stretch, problem)))
     is_closed = task.end == "start" and task.start == "free"
     if is_closed:
-        _check_meet(problems[-1], problems[0], ways[0])
-    for way, problem in zip(ways, problems, strict=True):
+        _check_meet(problems[-1], problems[0], stretches[0])
+    for stretch, problem in zip(stretches, problems, strict=True):
         if any(limit.guarantee.is_mean for limit in problem.limits):
             raise TaskError(
                 "a program cannot have limits on means over its time",
-                where=f"{way.key}, robot.limits.rms_torque",
+                where=f"{stretch.key}, robot.limits.rms_torque",
                 allowed="no such limit; verify the motion of the program against it",
             )
-    waits = [way.wait for way in ways]
+    waits = [stretch.wait for stretch in stretches]
     return ProblemChain.of_parts(whole, problems, waits, sections, is_closed=is_closed)
 
 
 @dataclass
-class _Way:
+class _Stretch:
     """A move, or successive parts along one path, with the numbers of its parts, the payload and the scene."""
 
     payload: Payload | None
@@ -121,12 +123,12 @@ class _Way:
             total += part.dwell
         return total
 
-    def goes_on_with(self, way: _Way) -> bool:
-        """Tell whether the only part of another way belongs to the same path."""
-        ((_, part),) = way.parts
+    def goes_on_with(self, stretch: _Stretch) -> bool:
+        """Tell whether the only part of another stretch belongs to the same path."""
+        ((_, part),) = stretch.parts
         if isinstance(part, DwellPart):
             return True
-        if (way.payload, way.scene) != (self.payload, self.scene):
+        if (stretch.payload, stretch.scene) != (self.payload, self.scene):
             return False
         if isinstance(part, RetractPart):
             return True
@@ -152,71 +154,71 @@ def _settings(part: PathPart) -> dict[str, Any]:
     return part.model_dump(exclude={"name", "path", "path_start", "events"})
 
 
-def _ways(task: Task) -> Iterator[_Way]:
-    """Yield the ways of a program."""
+def _stretches(task: Task) -> Iterator[_Stretch]:
+    """Yield the stretches of a program."""
     payload = task.robot.payload
-    way = None
+    stretch = None
     for number, part in enumerate(task.program):
         if isinstance(part, PayloadPart):
             payload = part.payload
             continue
-        begun = _Way(
+        begun = _Stretch(
             payload, scene_during(task.scene, task.program, number), [(number, part)]
         )
-        if way is not None and way.goes_on_with(begun):
-            way.parts += begun.parts
+        if stretch is not None and stretch.goes_on_with(begun):
+            stretch.parts += begun.parts
             continue
-        if way is not None:
-            yield way
-        way = begun
-    if way is not None:
-        yield way
+        if stretch is not None:
+            yield stretch
+        stretch = begun
+    if stretch is not None:
+        yield stretch
 
 
-def _free_ways(task: Task) -> Iterator[_Way]:
+def _free_stretches(task: Task) -> Iterator[_Stretch]:
     """Yield every path of a program whose order is free, with a move before, between and after them as needed."""
     payload = task.robot.payload
     move = (0, MovePart(move=NEXT, name="move"))
     for number, part in enumerate(task.program):
         if number or task.start != "free":
-            yield _Way(payload, task.scene, [move])
-        yield _Way(payload, task.scene, [(number, part)])
+            yield _Stretch(payload, task.scene, [move])
+        yield _Stretch(payload, task.scene, [(number, part)])
     if task.end != "free":
-        yield _Way(payload, task.scene, [move])
+        yield _Stretch(payload, task.scene, [move])
 
 
-def _robot_of(robot: Robot, way: _Way) -> Robot:
-    """Return the robot with the payload and the limits of a way."""
-    payload = way.payload
+def _robot_of(robot: Robot, stretch: _Stretch) -> Robot:
+    """Return the robot with the payload and the limits of a stretch."""
+    payload = stretch.payload
     if payload != robot.settings.payload:
         stated = {"mass": None} if payload is None else payload.model_dump()
         robot = robot.with_payload(**stated)
-    for part in way.of(LimitedPart)[:1]:
+    for part in stretch.of(LimitedPart)[:1]:
         if part.limits is not None:
             robot = robot.with_limits(**without_defaults(part.limits))
     return robot
 
 
 def _task_of(
-    way: _Way,
+    stretch: _Stretch,
     robot: Robot,
     task: Task,
     before: Problem | None,
     stated: Mapping[str, Posture | str],
 ) -> Task:
-    """Return the task of a way. `before` is the problem of the way before, `stated` are the postures at both ends."""
-    if not way.of(LimitedPart):
+    """Return the task of a stretch, given the problem of the one before and the postures at both ends."""
+    if not stretch.of(LimitedPart):
         raise TaskError(
             "the payload or the scene changes between a path and its approach or retract",
-            where=way.key,
+            where=stretch.key,
             allowed="a path in place of the approach or retract",
         )
-    limited = way.of(LimitedPart)[0]
+    limited = stretch.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
         "order": "given",
         "robot": robot.settings,
-        "scene": way.scene,
+        "scene": stretch.scene,
         # A scene may be empty during a part: the mode is that of the whole program.
         "collisions": task.collisions.model_copy(update={"mode": task.collision_mode}),
         **stated,
@@ -225,38 +227,40 @@ def _task_of(
     if isinstance(limited, MovePart):
         return task.model_copy(update=changes)
     changes |= path_keys(limited)
-    segments = _segments(way)
+    segments = _segments(stretch)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})
     changes["path"] = (*segments[:-1], ending)
     if changes["path_start"] is None and before is not None:
         changes["path_start"] = _end_of(before, changes)
-    approaches = way.of(ApproachPart)
-    retracts = way.of(RetractPart)
+    approaches = stretch.of(ApproachPart)
+    retracts = stretch.of(RetractPart)
     if (approaches or retracts) and _has_places(limited.tool_limits):
         raise TaskError(
             "with an approach or a retract, values of s are not those of the path alone",
-            where=f"{way.key}.tool_limits",
+            where=f"{stretch.key}.tool_limits",
             allowed="speed in the segments of the path",
         )
     if approaches or retracts:
         free = {"end": "free", "start": "free" if approaches else stated["start"]}
         plain = task.model_copy(update=changes | free)
         _, task_map = bind(robot, plain.task_space, plain.tolerances)
-        path = path_of(task_map, validate(Task, plain, way.key))
+        path = path_of(task_map, validate(Task, plain, stretch.key))
         if approaches:
-            changes["path_start"] = _pose(path, 0.0, approaches[0].approach, way)
+            changes["path_start"] = _pose(path, 0.0, approaches[0].approach, stretch)
             to = tuple(_pose(path, 0.0).position)
-            line = LineSegment(line=LineTo(to=to), stop=True, dwell=_first_wait(way))
+            line = LineSegment(
+                line=LineTo(to=to), stop=True, dwell=_first_wait(stretch)
+            )
             changes["path"] = (line, *changes["path"])
         if retracts:
-            away = _pose(path, 1.0, retracts[0].retract, way)
+            away = _pose(path, 1.0, retracts[0].retract, stretch)
             stopping = segments[-1].model_copy(update={"stop": True})
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
-    return validate(Task, task.model_copy(update=changes), way.key)
+    return validate(Task, task.model_copy(update=changes), stretch.key)
 
 
-def _check_meet(before: Problem, after: Problem, way: _Way) -> None:
+def _check_meet(before: Problem, after: Problem, stretch: _Stretch) -> None:
     """Refuse two paths that do not meet, with no move between them."""
     (last,) = before.path.sample(np.ones(1)).target
     (first,) = after.path.sample(np.zeros(1)).target
@@ -266,7 +270,7 @@ def _check_meet(before: Problem, after: Problem, way: _Way) -> None:
     if miss > tolerances.WRITTEN:
         raise PathError(
             "the path does not begin where the path before ends",
-            where=f"{way.key}.path_start",
+            where=f"{stretch.key}.path_start",
             found=f"{miss:.3g} m or rad apart",
             allowed=f"at most {tolerances.WRITTEN:g}",
             hint="Put {move: next} between them",
@@ -288,11 +292,11 @@ def _end_of(
     return tuple((target if frame is None else frame.to_frame(target)).tolist())
 
 
-def _segments(way: _Way) -> list[SegmentModel]:
-    """Return the segments of the paths of a way, with stops between the paths and the dwells between them."""
+def _segments(stretch: _Stretch) -> list[SegmentModel]:
+    """Return the segments of the paths of a stretch, with stops between the paths and the dwells between them."""
     segments: list[SegmentModel] = []
-    last = len(way.parts) - 1
-    for number, (_, part) in enumerate(way.parts):
+    last = len(stretch.parts) - 1
+    for number, (_, part) in enumerate(stretch.parts):
         if isinstance(part, PathPart):
             if segments:
                 segments[-1] = segments[-1].model_copy(update={"stop": True})
@@ -303,17 +307,19 @@ def _segments(way: _Way) -> list[SegmentModel]:
     return segments
 
 
-def _first_wait(way: _Way) -> float:
+def _first_wait(stretch: _Stretch) -> float:
     """Return the time for which the arm waits between the approach and the path, s."""
     total = 0.0
-    for _, part in way.parts:
+    for _, part in stretch.parts:
         if isinstance(part, PathPart):
             break
         total += part.dwell if isinstance(part, DwellPart) else 0.0
     return total
 
 
-def _pose(path: Path, s: float, back: float = 0.0, way: _Way | None = None) -> ToolPose:
+def _pose(
+    path: Path, s: float, back: float = 0.0, stretch: _Stretch | None = None
+) -> ToolPose:
     """Return a pose of a path, in its frame, moved back along the tool's z axis.
 
     Raises
@@ -327,7 +333,7 @@ def _pose(path: Path, s: float, back: float = 0.0, way: _Way | None = None) -> T
     if len(target) != _PLACES + 9:
         raise PathError(
             "an approach or a retract needs a path that prescribes the direction of the tool",
-            where=None if way is None else way.key,
+            where=None if stretch is None else stretch.key,
             allowed="task_space: pose or pose_free_roll",
         )
     rotation = target[_PLACES:].reshape(3, 3)
@@ -337,13 +343,13 @@ def _pose(path: Path, s: float, back: float = 0.0, way: _Way | None = None) -> T
     return ToolPose.model_validate(content)
 
 
-def _sections(way: _Way, problem: Problem) -> Iterator[Section]:
-    """Yield the sections of the path of a way, one for each part."""
+def _sections(stretch: _Stretch, problem: Problem) -> Iterator[Section]:
+    """Yield the sections of the path of a stretch, one for each part."""
     segments = problem.task.path
     stopping = [number for number, segment in enumerate(segments) if segment.stop]
     count = 0
     s_end = 0.0
-    for number, part in way.parts:
+    for number, part in stretch.parts:
         if isinstance(part, PathPart):
             count += len(part.path)
         elif not isinstance(part, DwellPart):

@@ -105,7 +105,7 @@ def find_batches(
 
 @dataclass(frozen=True, eq=False)
 class _ChainSearch:
-    """A search over the parts of a program; see `chain_batches`."""
+    """A search over the parts of a program; see `find_batches`."""
 
     problem: ProblemChain
     families: Sequence[ik.Family]
