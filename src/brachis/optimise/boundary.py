@@ -14,7 +14,7 @@ therefore need no rows in the NLP.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,16 +35,22 @@ class EndCondition:
     value : float
         Value at the end; NaN if the value is free.
     derivatives : (k,) ndarray
-        The first k time derivatives, per second; empty if the derivatives are free.
+        The first k time derivatives, per second; empty if the derivatives are free. They are NaN if they are free and
+        the speed of the motion too.
     """
 
     value: float
     derivatives: np.ndarray
 
     @property
+    def given(self) -> np.ndarray:
+        """The derivatives that are given, (k,)."""
+        return self.derivatives[np.isfinite(self.derivatives)]
+
+    @property
     def rate(self) -> float:
         """The first derivative at the end, per second; zero if it is free."""
-        return float(self.derivatives[:1].sum())
+        return float(self.given[:1].sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +118,7 @@ class BoundarySpline:
         count = len(knots) - degree - 1
         # All control points of a group are a single variable. Control points of group -1 are fixed.
         group = np.arange(count)
-        numbers = [1 + len(condition.derivatives) for condition in (start, end)]
+        numbers = [1 + len(condition.given) for condition in (start, end)]
         terms = np.zeros((max(numbers), count))
         first = slice(None, numbers[0])
         last = slice(count - numbers[1], None)
@@ -120,8 +126,8 @@ class BoundarySpline:
         for condition, anchor, near, far in sides:
             group[near] = anchor if np.isnan(condition.value) else -1
             terms[0, near] = np.nan_to_num(condition.value)
-            blossoms = _blossoms(knots, degree, anchor, len(condition.derivatives))
-            for power, derivative in enumerate(condition.derivatives, 1):
+            blossoms = _blossoms(knots, degree, anchor, len(condition.given))
+            for power, derivative in enumerate(condition.given, 1):
                 fading = blossoms[power] * (1.0 - np.abs(blossoms[1])) ** 2
                 fading[near] = blossoms[power][near]
                 fading[far] = 0.0
@@ -323,9 +329,34 @@ class Boundary:
         return self.start[0].rate, self.end[0].rate
 
     @property
-    def has_free_speeds(self) -> bool:
-        """Whether the speed of the first curve is free at an end."""
-        return not (len(self.start[0].derivatives) and len(self.end[0].derivatives))
+    def are_speeds_free(self) -> tuple[bool, bool]:
+        """Whether the speed of the motion is free at the start and at the end."""
+        sides = (self.start, self.end)
+        start, end = (np.isnan(side[0].derivatives).any() for side in sides)
+        return bool(start), bool(end)
+
+    def with_speeds(self, derivatives: np.ndarray | None = None) -> Boundary:
+        """Return the conditions with given derivatives where speeds are free; at rest by default.
+
+        Parameters
+        ----------
+        derivatives : (2, 2 or more, c) ndarray, optional
+            First, second, ... derivatives of the curves at the start and at the end, per second.
+        """
+        if not any(self.are_speeds_free):
+            return self
+        if derivatives is None:
+            derivatives = np.zeros((2, ORDERS, len(self.start)))
+        sides = []
+        for side, given, is_free in zip(
+            (self.start, self.end), derivatives, self.are_speeds_free, strict=True
+        ):
+            changed = [
+                replace(condition, derivatives=of_curve[: len(condition.derivatives)])
+                for condition, of_curve in zip(side, given.T, strict=True)
+            ]
+            sides.append(tuple(changed) if is_free else side)
+        return replace(self, start=sides[0], end=sides[1])
 
     @property
     def ahead(self) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import cut
 from brachis.kinematics import ChartMap, Nodes, interpolate, join_nodes
-from brachis.optimise.links import CurveLink
+from brachis.optimise.links import CurveLink, PostureLink
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
@@ -275,10 +275,8 @@ def join_motions(program: Program, x: np.ndarray) -> list[Motion]:
             after = program.phases[link.after]
             motions[link.after] = _begin_with(motions[link.after], after, link, last)
         else:
-            # A move is changed, because its curves are the joints.
-            sides = [(link.before, -1), (link.after, 0)]
-            is_move = program.phases[link.before].joint_map.is_move
-            (moved, end), (kept, place) = sides if is_move else sides[::-1]
+            assert isinstance(link, PostureLink)
+            (moved, end), (kept, place) = link.sides(program.phases)
             state = states[kept]
             orders = np.array([state.q, state.qdot, state.qddot])[:, place]
             linked = orders[: 1 + max(link.orders)]
@@ -289,7 +287,7 @@ def join_motions(program: Program, x: np.ndarray) -> list[Motion]:
 def _meet(motion: Motion, phase: Phase, end: int, orders: np.ndarray) -> Motion:
     """Return the motion of a phase that has a posture and k derivatives, (1 + k, n or more), at one end."""
     joint_map = phase.joint_map
-    fixed = (phase.boundary.start, phase.boundary.end)[end][-1].derivatives
+    fixed = (phase.boundary.start, phase.boundary.end)[end][-1].given
     s = float(motion.at(np.array([0.0, motion.t_end])[[end]])[0][0, 0])
     y = joint_map.coordinates(s, orders[0, : joint_map.robot.n])[1:]
     values = np.zeros((max(1 + len(fixed), len(orders)), len(y)))
@@ -305,7 +303,7 @@ def _begin_with(
 ) -> Motion:
     """Return the motion with a new start: a link sets some values and derivatives to those of `last`, (4, c)."""
     orders = np.array(motion.at(np.zeros(1)))[:, 0]
-    fixed_derivatives = phase.boundary.start[-1].derivatives
+    fixed_derivatives = phase.boundary.start[-1].given
     fixed_orders = len(fixed_derivatives)
     # Set them exactly: in an interval of microseconds, a rounding error becomes an acceleration not allowed at rest.
     orders[1 : 1 + fixed_orders, list(link.curves)] = fixed_derivatives[:, None]

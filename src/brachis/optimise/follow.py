@@ -172,6 +172,8 @@ def follow(
     timing = phase_timing.timing
     if timing is None:
         return None
+    free = phase
+    phase = phase.with_grid(phase.grid, phase_timing.boundary)
     best = None
     aim = _SHARE * tolerance
     lost = _FIRST_LOSS * aim
@@ -201,7 +203,7 @@ def follow(
             breaks = np.union1d(breaks, halfway(breaks)[is_over])
     if best is None:
         return None
-    finer, x = _as_phase(phase, best.laid.motion, points)
+    finer, x = _as_phase(free, best.laid.motion, points)
     return finer, x, best.violation
 
 
@@ -231,8 +233,9 @@ def begin(
     phase : Phase
     x : (v,) ndarray
     """
-    breaks = _knots(phase, phase_timing, timing, lost, _FIRST_WAIT, intervals)
-    motion = _lay_splines(phase, phase_timing, timing, breaks).motion
+    given = phase.with_grid(phase.grid, phase_timing.boundary)
+    breaks = _knots(given, phase_timing, timing, lost, _FIRST_WAIT, intervals)
+    motion = _lay_splines(given, phase_timing, timing, breaks).motion
     return _as_phase(phase, motion, points)
 
 
@@ -254,7 +257,7 @@ def _knots(
 def _vanishing(phase: Phase) -> tuple[int, int]:
     """Return the number of vanishing derivatives at each end of a phase, from the acceleration upwards."""
     ends = phase.boundary.start, phase.boundary.end
-    first, last = (max(len(end[-1].derivatives) - 1, 0) for end in ends)
+    first, last = (0 if end[0].rate else max(len(end[-1].given) - 1, 0) for end in ends)
     return first, last
 
 

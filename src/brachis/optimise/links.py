@@ -10,11 +10,34 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from brachis.optimise.means import PhasePoints
-from brachis.optimise.phase import Phase
+from brachis.kinematics import JointMap, JointState
+
+
+class LinkedPhase(Protocol):
+    """A phase, over time or over the path, as links see it."""
+
+    @property
+    def joint_map(self) -> JointMap:
+        """Map from the curves to the joints."""
+
+    def state(self, x: np.ndarray) -> JointState:
+        """Return the joint motion at the points of the phase, of which the first and the last are its ends."""
+
+    def end_pattern(self, point: int) -> np.ndarray:
+        """Return the variables, (z,), that affect the curves at the first (0) or last (-1) point."""
+
+    def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
+        """Return slopes of the curves and their time derivatives at an end, (3 or 4, c, z)."""
+
+    def last_interval(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the duration of the last interval, s, and its relative slopes, (z,), by the variables at the end."""
+
+
+PhasePoints = Sequence[tuple[LinkedPhase, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,22 +62,22 @@ class Link(ABC):
         """Number of values that are linked."""
 
     @abstractmethod
-    def _values(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    def _values(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
         """Return the values and their derivatives, (orders, width), at the first (0) or last (-1) point of a phase."""
 
     @abstractmethod
-    def _slopes(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
-        """Return slopes of `_values`, (orders, width, z), by the variables of `Phase.end_pattern`."""
+    def _slopes(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
+        """Return slopes of `_values`, (orders, width, z), by the variables of `end_pattern`."""
 
     @property
     def size(self) -> int:
         """Number of rows of the link."""
         return self.width * len(self.orders)
 
-    def _scales(self, phase: Phase, x: np.ndarray) -> np.ndarray:
+    def _scales(self, phase: LinkedPhase, x: np.ndarray) -> np.ndarray:
         """Return the factors on the rows of each order, (orders, 1)."""
-        interval = x[0] * (1.0 - phase.breaks[-2])
-        return interval ** np.array(self.orders)[:, None]
+        duration, _ = phase.last_interval(x)
+        return duration ** np.array(self.orders)[:, None]
 
     def rows(self, phase_points: PhasePoints) -> np.ndarray:
         """Compute the values of the rows, by order and value. `phase_points` are all phases with their variables."""
@@ -63,13 +86,13 @@ class Link(ABC):
         return (self._scales(*phase_points[self.before]) * (last - first)).ravel()
 
     def pattern(
-        self, phases: Sequence[Phase], first: Sequence[int]
+        self, phases: Sequence[LinkedPhase], first: Sequence[int]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return rows, counted from 0, and columns of the Jacobian's entries, (nnz,) each.
 
         Parameters
         ----------
-        phases : sequence of Phase
+        phases : sequence of LinkedPhase
             All phases of the program.
         first : sequence of int
             Index of the first variable of each phase.
@@ -88,10 +111,9 @@ class Link(ABC):
         last = scales * self._slopes(phase, x, -1)
         first = -scales * self._slopes(*phase_points[self.after], 0)
         # The scales grow with the duration.
-        growth = (
-            orders[:, None] / x[0] * self.rows(phase_points).reshape(len(orders), -1)
-        )
-        last[:, :, phase.end_pattern(-1) == 0] += growth[:, :, None]
+        _, growth = phase.last_interval(x)
+        rows = self.rows(phase_points).reshape(len(orders), -1)
+        last += (orders[:, None] * rows)[:, :, None] * growth
         return np.concatenate([last, first], axis=2).ravel()
 
 
@@ -109,11 +131,11 @@ class CurveLink(Link):
         """Number of curves that are linked."""
         return len(self.curves)
 
-    def _values(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    def _values(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
         curves = np.array([curves[point] for curves in phase.state(x).curves])
         return curves[np.ix_(self.orders, self.curves)]
 
-    def _slopes(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    def _slopes(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
         return phase.end_slopes(x, point)[np.ix_(self.orders, self.curves)]
 
 
@@ -134,18 +156,29 @@ class PostureLink(Link):
         """Number of combinations."""
         return len(self.combinations)
 
+    def sides(
+        self, phases: Sequence[LinkedPhase]
+    ) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Return the numbers of the phase that is changed so that both meet, and of the other, each with its end.
+
+        A move is changed, because its curves are the joints.
+        """
+        before, after = (self.before, -1), (self.after, 0)
+        is_move = phases[self.before].joint_map.is_move
+        return (before, after) if is_move else (after, before)
+
     def combine(self, values: np.ndarray) -> np.ndarray:
         """Return the combinations, (k, ...), of values of the joints, (n or more, ...)."""
         return self.combinations @ values[: self.combinations.shape[1]]
 
-    def _values(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    def _values(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
         state = phase.state(x)
         motion = (state.q, state.qdot, state.qddot)
         return np.array([self.combine(motion[order][point]) for order in self.orders])
 
-    def _slopes(self, phase: Phase, x: np.ndarray, point: int) -> np.ndarray:
+    def _slopes(self, phase: LinkedPhase, x: np.ndarray, point: int) -> np.ndarray:
         state = phase.state(x)
-        y, ydot, yddot, _ = phase.end_slopes(x, point)
+        y, ydot, yddot = phase.end_slopes(x, point)[:3]
         gradient = state.gradient[point]
         by = state.derivatives
         slopes = (

@@ -24,11 +24,12 @@ from brachis.common import tolerances
 from brachis.common.arrays import LastCall, cut, spread
 from brachis.errors import UnreachableError
 from brachis.kernel import CurvePattern, VariableSlopes
+from brachis.kinematics import JointState
 from brachis.limits import Limit, Moments
-from brachis.optimise.boundary import LocalBasis
+from brachis.optimise.boundary import Boundary, LocalBasis
 from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
-from brachis.optimise.motion import follow_law
+from brachis.optimise.motion import Motion, follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.timing import Course, TimedCourse
@@ -104,6 +105,7 @@ class PathPhase:
         timing = phase_timing.timing
         assert timing is not None and phase.joint_map.path is not None
         self.phase = phase
+        self.joint_map = phase.joint_map
         t = np.linspace(0.0, timing.t_end, _SAMPLES * intervals + 1)
         curves = phase_timing.course.curves(timing, t)[0]
         ascends = np.append(True, np.diff(curves[:, 0]) > _SHORTEST)
@@ -124,6 +126,12 @@ class PathPhase:
         rates = phase_timing.course.curves(timing, np.interp(self._s, s, t))[1][:, 0]
         squares = (rates if law is None else follow_law(law, self._s)[1]) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
+        # At rest, a solver would not see how a free speed depends on the tangents.
+        for end, beside in zip((0, -1), (1, -2), strict=True):
+            if phase.boundary.are_speeds_free[end]:
+                squares[end] = max(squares[end], squares[beside])
+                self._units[end] = max(self._units[end], squares[end])
+        self._last_interval = timing.t_end / intervals
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
         self.breaks = np.interp(edges, t, s)
         self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
@@ -178,8 +186,8 @@ class PathPhase:
         count = len(self._s)
         self.start = np.concatenate([squares / self._units, points.ravel()])
         is_fixed = np.zeros(len(self.start), dtype=bool)
-        is_fixed[[0, count - 1]] = True
         boundary = self.phase.boundary
+        is_fixed[[0, count - 1]] = np.logical_not(boundary.are_speeds_free)
         if boundary.time_law is not None:
             is_fixed[:count] = True
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
@@ -211,6 +219,54 @@ class PathPhase:
         timed_squares = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
         inner = np.maximum(timed_squares[1:-1], _SLOWEST)
         self.start[1 : len(self._s) - 1] = inner
+
+    def state(self, x: np.ndarray) -> JointState:
+        """Return the joint motion at the places; raise as `evaluate` does."""
+        return self.evaluate(x).motion
+
+    def last_interval(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the initial duration of the last spline interval, s, and zero slopes, (z,)."""
+        return self._last_interval, np.zeros(len(self.end_pattern(-1)))
+
+    def end_pattern(self, point: int) -> np.ndarray:
+        """Return the variables, (z,), that affect the curves at an end: X at two stations, and control points."""
+        first = (self._number[point], self._number[point] + 1)
+        curves = np.arange(self.curves_count)[:, None] * self._count
+        points = len(self._s) + curves + self._basis.columns[point]
+        return np.concatenate([first, points.ravel()])
+
+    def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
+        """Return slopes of the curves and their time derivatives at an end, (3, c, z); see `end_pattern`."""
+        by_squares, by_points = self._slopes(x)
+        width = by_points.shape[-1]
+        slopes = np.zeros((3, 1 + self.curves_count, 2 + width * self.curves_count))
+        slopes[:, :, :2] = by_squares[:, :, point].transpose(1, 2, 0)
+        for curve in range(self.curves_count):
+            first = 2 + width * curve
+            slopes[:, 1 + curve, first : first + width] = by_points[:, point]
+        return slopes
+
+    def boundary_at(self, x: np.ndarray, factor: float) -> Boundary:
+        """Return the conditions at both ends, with all free speeds smaller than at x by a factor."""
+        (_, y_ds, y_dds), square, u = self._evaluate(x)[0]
+        ydot = factor * y_ds * np.sqrt(square)
+        yddot = factor**2 * (y_dds * square + y_ds * u)
+        derivatives = np.array([ydot, yddot])[:, [0, -1]].swapaxes(0, 1)
+        return self.phase.boundary.with_speeds(derivatives)
+
+    def with_end(self, x: np.ndarray, end: int, orders: np.ndarray) -> np.ndarray:
+        """Return x of a move with given joint positions and time derivatives, (1 + k, n), at one end."""
+        (_, _, _), square, u = self._evaluate(x)[0]
+        rate = np.sqrt(square[end])
+        values = orders.copy()
+        if len(values) > 1:
+            values[1] /= rate
+        if len(values) > 2:
+            values[2] = (values[2] - values[1] * u[end]) / square[end]
+        points = self._split(x)[1]
+        motion = Motion(1.0, self._knots, _DEGREE, points)
+        points = motion.with_end(end, values, range(self.curves_count)).control_points
+        return np.concatenate([x[: len(self._s)], points.ravel()])
 
     def places_at(self, end: int) -> np.ndarray:
         """Return the indices, (r,), of the variables that are the redundant curves' values at an end (0 or -1)."""
@@ -309,12 +365,13 @@ class PathPhase:
         return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Return the gradient of the time, (v,). It is zero with respect to X at both ends, which is given."""
+        """Return the gradient of the time, (v,). It is zero with respect to X at an end where it is given."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
         by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
         by_square = by_rate / (2.0 * rates) * self._units
-        by_square[[0, -1]] = 0.0
+        is_given = np.logical_not(self.phase.boundary.are_speeds_free)
+        by_square[np.array([0, -1])[is_given]] = 0.0
         return np.pad(by_square, (0, len(x) - len(by_square)))
 
     def rows(self, x: np.ndarray) -> np.ndarray:
@@ -323,7 +380,22 @@ class PathPhase:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Compute the entries of the Jacobian on its pattern, (nnz,)."""
-        ((_, y_ds, y_dds), square, u), evaluation = self._evaluate(x)
+        by_squares, basis = self._slopes(x)
+        by_points = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
+        variables = VariableSlopes(by_squares, self._pattern, by_points)
+        return self.evaluate(x).differentiate(variables)[1].ravel()
+
+    def _slopes(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return slopes of the curves and their time derivatives at the places.
+
+        Returns
+        -------
+        by_squares : (2, 3, L, c) ndarray
+            With respect to X at the stations before and after each place.
+        by_points : (3, L, 4) ndarray
+            With respect to the control points of a curve.
+        """
+        (_, y_ds, y_dds), square, u = self._evaluate(x)[0]
         rate = np.sqrt(square)
         # X vanishes only where it is given.
         half = np.divide(0.5, rate, out=np.zeros_like(rate), where=rate > 0.0)
@@ -331,10 +403,8 @@ class PathPhase:
         by_squares[:, 1] = self._by_square * (half * y_ds)
         by_squares[:, 2] = self._by_square * y_dds + self._by_step * y_ds
         value, first, second, _ = self._basis.values
-        basis = np.array([value, first * rate, second * square + first * u])
-        by_points = np.repeat(basis[:, None], self.curves_count, axis=1).reshape(3, -1)
-        variables = VariableSlopes(by_squares, self._pattern, by_points)
-        return evaluation.differentiate(variables)[1].ravel()
+        by_points = np.array([value, first * rate, second * square + first * u])
+        return by_squares, by_points
 
     def curves(self, x: np.ndarray) -> np.ndarray:
         """Return s and the redundant curves at many places, (S, c)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +13,9 @@ from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import PhaseSequence
 
+_SLOWER = (1.0, 0.99, 0.97, 0.9, 0.7)
+"""Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing."""
+
 
 class PathProgram(PhaseSequence[PathPhase]):
     """The NLP over the path of all phases, as a `NonlinearProgram` for the solvers.
@@ -20,55 +24,41 @@ class PathProgram(PhaseSequence[PathPhase]):
     ----------
     phases : sequence of PathPhase
     links : sequence of Link
-        Links between phases. They link only values, because phases meet at rest.
+        Links between phases. Links of curves link only values here.
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
         super().__init__(phases)
         first = self.first_variables
         self.start = np.concatenate([phase.start for phase in self.phases])
-        # Phases meet at rest.
         self._links = [
-            link for link in links if isinstance(link, PostureLink) and 0 in link.orders
-        ]
-        joins = [
-            (link.before, link.after, link.curves)
+            replace(link, orders=(0,)) if isinstance(link, CurveLink) else link
             for link in links
-            if isinstance(link, CurveLink)
+            if not (isinstance(link, CurveLink) and link.curves == (0,))
         ]
-        if self.phases[0].phase.boundary.periodic:
-            joins.append((0, 0, tuple(range(1, 1 + self.phases[0].curves_count))))
-        pairs = [
-            (
-                first[before] + self.phases[before].places_at(-1)[curve - 1],
-                first[after] + self.phases[after].places_at(0)[curve - 1],
-            )
-            for before, after, curves in joins
-            for curve in curves
-            if curve > 0
-        ]
-        self._pairs = np.reshape(np.array(pairs, dtype=int), (-1, 2))
+        if self.phases[0].phase.boundary.periodic and self.phases[0].curves_count:
+            redundant = tuple(range(1, 1 + self.phases[0].curves_count))
+            self._links.append(CurveLink(0, 0, (0,), redundant))
         row = 0
         rows = []
         columns = []
-        for phase, column in zip(self.phases, first, strict=True):
-            rows.append(phase.jacobian_rows + row)
-            columns.append(phase.jacobian_columns + column)
-            row += len(phase.lower)
-        numbers = row + np.arange(len(self._pairs))
-        rows.append(np.repeat(numbers, 2))
-        columns.append(self._pairs.ravel())
-        row += len(self._pairs)
-        for link in self._links:
-            places = [
-                first[number] + self.phases[number].places_at(end)
-                for number, end in ((link.before, -1), (link.after, 0))
-            ]
-            at_ends = np.concatenate(places)
-            numbers = row + np.arange(link.width)
-            rows.append(np.repeat(numbers, len(at_ends)))
-            columns.append(np.tile(at_ends, link.width))
-            row += link.width
+        patterns = [
+            *(
+                (phase.jacobian_rows, phase.jacobian_columns + column)
+                for phase, column in zip(self.phases, first, strict=True)
+            ),
+            *(link.pattern(self.phases, first) for link in self._links),
+        ]
+        heights = [
+            *(len(phase.lower) for phase in self.phases),
+            *(link.size for link in self._links),
+        ]
+        for (rows_of_block, columns_of_block), height in zip(
+            patterns, heights, strict=True
+        ):
+            rows.append(rows_of_block + row)
+            columns.append(columns_of_block)
+            row += height
         self.value_numbers = self._number_values()
         self.jacobian_rows = np.concatenate(rows)
         self.jacobian_columns = np.concatenate(columns)
@@ -85,7 +75,7 @@ class PathProgram(PhaseSequence[PathPhase]):
     @property
     def _joined(self) -> int:
         """Number of rows of links."""
-        return len(self._pairs) + sum(link.width for link in self._links)
+        return sum(link.size for link in self._links)
 
     @property
     def lower(self) -> np.ndarray:
@@ -121,16 +111,9 @@ class PathProgram(PhaseSequence[PathPhase]):
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Compute the values of the rows, (c,); raise UnreachableError if the joint map has no posture."""
-        before, after = x[self._pairs].T
         parts = self.split(x)
         rows = [phase.rows(x_of_phase) for phase, x_of_phase in parts]
-        rows.append(before - after)
-        for link in self._links:
-            last, first = (
-                link.combine(phase.evaluate(x_of_phase).motion.q[end])
-                for (phase, x_of_phase), end in self._sides(link, parts)
-            )
-            rows.append(last - first)
+        rows += [link.rows(parts) for link in self._links]
         return np.concatenate(rows)
 
     def meet(self, x: np.ndarray) -> np.ndarray:
@@ -139,37 +122,23 @@ class PathProgram(PhaseSequence[PathPhase]):
         A solver links postures only to within its tolerance. In an interval of microseconds, the rest would become a
         jump of the torque.
         """
-        x = x.copy()
+        parts = self.split(x)
+        met = [x_of_phase for _, x_of_phase in parts]
         for link in self._links:
-            sides = [(link.before, -1), (link.after, 0)]
-            is_move = self.phases[link.before].phase.joint_map.is_move
-            (moved, end), (kept, place) = sides if is_move else sides[::-1]
-            phase, x_of_phase = self.split(x)[kept]
-            q = phase.evaluate(x_of_phase).motion.q[place]
-            path_phase = self.phases[moved]
-            joint_map = path_phase.phase.joint_map
-            y = joint_map.coordinates(path_phase.ends[end], q[: joint_map.robot.n])
-            x[self.first_variables[moved] + path_phase.places_at(end)] = y[1:]
-        return x
-
-    @staticmethod
-    def _sides(
-        link: Link, parts: Sequence[tuple[PathPhase, np.ndarray]]
-    ) -> tuple[tuple[tuple[PathPhase, np.ndarray], int], ...]:
-        """Return the phases on both sides of a link, with their variables, each with the place of the link."""
-        return (parts[link.before], -1), (parts[link.after], 0)
+            if isinstance(link, PostureLink):
+                (moved, end), (kept, place) = link.sides(self.phases)
+                phase, x_of_phase = parts[kept]
+                state = phase.state(x_of_phase)
+                orders = np.array([state.q, state.qdot, state.qddot])[:, place]
+                linked = orders[: 1 + max(link.orders), : link.combinations.shape[1]]
+                met[moved] = self.phases[moved].with_end(met[moved], end, linked)
+        return np.concatenate(met)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Compute the entries of the Jacobian on its pattern, (nnz,); raise as `rows` does."""
         parts = self.split(x)
         entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in parts]
-        entries.append(np.tile([1.0, -1.0], len(self._pairs)))
-        for link in self._links:
-            last, first = (
-                link.combine(phase.evaluate(x_of_phase).motion.gradient[end, :, 1:])
-                for (phase, x_of_phase), end in self._sides(link, parts)
-            )
-            entries.append(np.hstack([last, -first]).ravel())
+        entries += [link.jacobian(parts) for link in self._links]
         return np.concatenate(entries)
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -180,14 +149,18 @@ class PathProgram(PhaseSequence[PathPhase]):
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases again with `PhaseTiming.along`."""
-        courses = [
-            partial(path_phase.course, x_of_phase)
-            for path_phase, x_of_phase in self.split(x)
-        ]
-        pairs = zip(self.phases, courses, strict=True)
-        return tuple(
-            PhaseTiming.along(
-                path_phase.phase, course, path_phase.ends, places, is_rough=is_rough
+        for factor in _SLOWER:
+            timings = tuple(
+                PhaseTiming.along(
+                    path_phase.phase,
+                    partial(path_phase.course, x_of_phase),
+                    path_phase.ends,
+                    places,
+                    boundary=path_phase.boundary_at(x_of_phase, factor),
+                    is_rough=is_rough,
+                )
+                for path_phase, x_of_phase in self.split(x)
             )
-            for path_phase, course in pairs
-        )
+            if all(timing.timing is not None for timing in timings):
+                break
+        return timings

@@ -430,6 +430,11 @@ class Phase:
         slopes = self.slopes_by_variables(by_curves, x)[self._at_end(point)]
         return slopes.T.reshape(ORDERS, curves, -1)
 
+    def last_interval(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the duration of the last interval, s, and its relative slopes, (z,); see `end_pattern`."""
+        growth = np.where(self.end_pattern(-1) == 0, 1.0 / x[0], 0.0)
+        return float(x[0] * (1.0 - self.breaks[-2])), growth
+
     def _at_end(self, point: int) -> np.ndarray:
         """Return the indices of entries at the first or last collocation point, leaving out T if it is given."""
         number = range(len(self.t_norm))[point]

@@ -11,6 +11,7 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import cut, drop_near, spread
 from brachis.errors import UnreachableError
+from brachis.optimise.boundary import Boundary
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.timing import Course, TimedCourse, Timing, divide_turns
@@ -48,6 +49,8 @@ class PhaseTiming:
     course : TimedCourse
     rates : tuple of float
         Rates of the joint path's length at both ends, 1/s.
+    boundary : Boundary
+        Conditions at both ends, without free speeds.
     timing : Timing or None
         The timing; None if the limits allow none. Because of rounding, they may reject even that of the motion itself.
     fixed_duration : float or None
@@ -56,6 +59,7 @@ class PhaseTiming:
 
     course: TimedCourse
     rates: tuple[float, float]
+    boundary: Boundary
     timing: Timing | None
     fixed_duration: float | None = None
 
@@ -81,6 +85,8 @@ class PhaseTiming:
         least = _FEW_PLACES if is_rough else _LEAST_PLACES
         count = max(least, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
+        at_ends = np.array(motion.at(t[[0, -1]])).swapaxes(0, 1)
+        boundary = phase.boundary.with_speeds(at_ends[:, 1:])
 
         def lay(t: np.ndarray) -> PhaseTiming:
             """Time the joint path at stations given by times, (P,)."""
@@ -92,7 +98,7 @@ class PhaseTiming:
             fine = _lay_finely(phase, course_at, t)
             course = TimedCourse(fine, phase.joint_map, phase.limits)
             rates = float(course.speeds[0]), float(course.speeds[-1])
-            return cls(course, rates, course.solve(rates))
+            return cls(course, rates, boundary, course.solve(rates))
 
         try:
             return lay(t) if is_rough else _resolve_ramps(lay, t)
@@ -107,6 +113,7 @@ class PhaseTiming:
         ends: tuple[float, float],
         places: int = PLACES,
         *,
+        boundary: Boundary | None = None,
         is_rough: bool = False,
     ) -> PhaseTiming:
         """Time a joint path; raise UnreachableError if it leaves the joint map.
@@ -114,19 +121,21 @@ class PhaseTiming:
         Parameters
         ----------
         phase : Phase
-            Phase that gives the rates at both ends.
         course_at : callable
             Function that returns the curves at ascending path coordinates, (P,).
         ends : tuple of float
             Path coordinates of both ends.
         places : int, optional
             Minimum number of places at which the path is timed; a third of this number if `is_rough`.
+        boundary : Boundary, optional
+            Conditions at both ends, without free speeds; by default those of the phase, at rest where speeds are free.
         is_rough : bool, optional
             Whether the path is timed only once, at evenly spread places. This gives the time to within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None
         begin, end = ends
+        given = boundary or phase.boundary.with_speeds()
         pieces = drop_near(cut(path.knots, begin, end), tolerances.PATH)
         number = len(pieces) - 1
         count = max(places, min(_PLACES_A_PIECE * number, _MOST_PLACES))
@@ -138,14 +147,14 @@ class PhaseTiming:
             course = _lay_finely(phase, course_at, s)
             sdot = None if estimate is None else np.interp(course.p, *estimate)
             timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
-            return timed, tuple(timed.speeds[[0, -1]] * phase.boundary.rates)
+            return timed, tuple(timed.speeds[[0, -1]] * given.rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length, agreement=_ROUGH_AGREEMENT)
         law = phase.time_law
         duration = None if law is None else law.duration
         if timing is None or is_rough:
-            return cls(course, by_length, timing, duration)
+            return cls(course, by_length, given, timing, duration)
         # Place stations at equal time steps of this timing.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
@@ -157,7 +166,7 @@ class PhaseTiming:
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
             course, by_length = lay(s, (passed, ydot[:, 0]))
-            return cls(course, by_length, course.solve(by_length), duration)
+            return cls(course, by_length, given, course.solve(by_length), duration)
 
         return _resolve_ramps(time_at, s)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
@@ -359,6 +360,25 @@ class Program(PhaseSequence[Phase], Summary):
     def with_phases(self, phases: Iterable[Phase]) -> Program:
         """Return the same program with different phases."""
         return Program(phases, self.links, self.minimised)
+
+    @property
+    def flies(self) -> bool:
+        """Whether a phase begins or ends at a speed that is free."""
+        return any(any(phase.boundary.are_speeds_free) for phase in self.phases)
+
+    def at_rest(self) -> Program:
+        """Return the same program with rest in place of free speeds."""
+        if not self.flies:
+            return self
+        phases = [
+            phase.with_grid(phase.grid, phase.boundary.with_speeds())
+            for phase in self.phases
+        ]
+        links = [
+            replace(link, orders=(0,)) if 0 in link.orders else link
+            for link in self.links
+        ]
+        return Program(phases, [link for link in links if 0 in link.orders])
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with new collocation points in every phase; see `Phase.with_points`."""

@@ -15,6 +15,7 @@ from brachis.optimise.backends import SolverOptions, SolverReport, SolveStatus
 from brachis.optimise.follow import begin, follow
 from brachis.optimise.guess import shortest_time
 from brachis.optimise.improve import SolverSession
+from brachis.optimise.links import CurveLink
 from brachis.optimise.path_phase import PathPhase, violation_of_postures
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase import Phase
@@ -206,12 +207,13 @@ def begin_with_timing(
 
 
 def is_timing_all(program: Program) -> bool:
-    """Tell whether the phase plane covers all limits, and all speeds where phases begin and end are given."""
-    has_free_speeds = any(phase.boundary.has_free_speeds for phase in program.phases)
+    """Tell whether the phase plane covers all limits, and all phases meet at rest or fly."""
+    curve_links = [link for link in program.links if isinstance(link, CurveLink)]
+    is_linked = any(max(link.orders) for link in curve_links)
     is_periodic = any(phase.boundary.periodic for phase in program.phases)
     has_laws = any(phase.time_law is not None for phase in program.phases)
     left_out = any(map(is_left_out, program.limits))
-    return not (has_free_speeds or is_periodic or has_laws or left_out)
+    return not (is_linked or is_periodic or has_laws or left_out)
 
 
 @dataclass(frozen=True)
@@ -299,7 +301,7 @@ def improve_joint_paths(
     is_first_rough = effort.is_rough_before if r else effort.is_rough_after
     timings = time_paths(is_rough=is_first_rough)
     best = BetterPaths(tuple(curves), timings, (), beyond)
-    if not r:
+    if not (r or program.flies):
         return best
     apart = program.with_margin(effort.margin)
     for count in effort.intervals:

@@ -148,7 +148,10 @@ def boundary_of(problem: Problem, joint_map: JointMap, number: int) -> Boundary:
     sides = []
     for side, values in ((0, y_start), (-1, y_end)):
         s_derivatives = _derivatives_of_s(problem, number, side)
-        derivatives = zeros if _is_at_rest(problem, number, side) else np.empty(0)
+        derivatives = s_derivatives
+        if not np.isnan(s_derivatives).any():
+            is_at_rest = _is_at_rest(problem, number, side)
+            derivatives = zeros if is_at_rest else np.empty(0)
         first = EndCondition(float(values[0]), s_derivatives)
         redundant = (EndCondition(float(value), derivatives) for value in values[1:])
         sides.append((first, *redundant))
@@ -177,7 +180,7 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
         derivatives = time_law.ends[-1 - side]
         return derivatives[1 : 1 + derivatives_in_motion(problem)]
     if problem.task.boundary.speeds[side] == FREE:
-        return np.empty(0)
+        return np.full(problem.flying_orders, np.nan)
     derivatives = np.zeros(problem.task.spline.vanishing)
     derivatives[0] = problem.leg_rates[number][side]
     return derivatives

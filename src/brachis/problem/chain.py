@@ -38,7 +38,8 @@ class Section:
 class ProblemChain(Problem):
     """A problem whose motion consists of the motions of other problems.
 
-    Its legs and time laws are those of all parts; the parts have limits of their own. The arm stops between the parts, unless it flies.
+    Its legs and time laws are those of all parts; the parts have limits of their own. The arm stops between the parts,
+    unless it flies.
 
     Attributes
     ----------
@@ -143,7 +144,7 @@ class ProblemChain(Problem):
             ends = self.chained[before].end, self.chained[after].start
             orders = [0] if any(posture is None for posture in ends) else []
             if self.flies(before):
-                orders += range(1, min(3, self.task.spline.degree))
+                orders += range(1, 1 + self.flying_orders)
             if orders:
                 joins.append((before, after, tuple(orders)))
         return joins

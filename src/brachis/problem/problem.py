@@ -148,6 +148,11 @@ class Problem(Summary):
         return part
 
     @property
+    def flying_orders(self) -> int:
+        """Number of time derivatives that are continuous where parts meet in motion."""
+        return min(2, self.task.spline.vanishing)
+
+    @property
     def flights(self) -> list[list[int]]:
         """Numbers of the parts, divided where the arm stops: one list, because there is only one part."""
         return [[0]]

@@ -80,8 +80,11 @@ def bind_task(
         changed = _robot_of(robot, stretch)
         before = problems[-1] if problems else None
         stated: dict[str, Any] = dict(zip(("start", "end"), postures, strict=True))
-        speeds = [FREE if flies else 0.0 for flies in flights[number : number + 2]]
-        stated["boundary"] = BoundarySettings(start_speed=speeds[0], end_speed=speeds[1])
+        begins_flying, ends_flying = flights[number : number + 2]
+        stated["boundary"] = BoundarySettings(
+            start_speed=FREE if begins_flying else 0.0,
+            end_speed=FREE if ends_flying else 0.0,
+        )
         part_task = _task_of(stretch, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
         if before is not None:

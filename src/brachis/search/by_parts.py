@@ -64,9 +64,7 @@ def finish_by_parts(candidate: RankedCandidate, finish: Finish) -> Candidate:
         finished.append(outcome)
     motions = [outcome.trajectory for outcome in finished]
     components = [
-        part
-        for motion in motions
-        for _, part in motion.components or [(0.0, motion)]
+        part for motion in motions for _, part in motion.components or [(0.0, motion)]
     ]
     motion = compose(guess.problem, components)
     known = replace(candidate, guess=replace(guess, problem=chain))

@@ -113,7 +113,7 @@ def improve_guess(
             moved = _lay_chart(better)
             if moved is None or solve.deadline.passed:
                 break
-            chart_program = _program_like(program, moved)
+            chart_program = program_like(program, moved)
             paths = improve_joint_paths(
                 chart_program, moved.legs, solve, tolerance, effort
             )
@@ -130,7 +130,7 @@ def improve_guess(
     return better
 
 
-def _program_like(program: Program, guess: InitialGuess) -> Program:
+def program_like(program: Program, guess: InitialGuess) -> Program:
     """Return the program of a guess over the knots of another program."""
     grids = [phase.grid for phase in program.phases]
     return program_over(guess.problem, guess.maps_by_leg(), grids)
@@ -145,7 +145,7 @@ def _centre(better: BetterGuess) -> BetterGuess:
     chart, s, q = _chart_of(better.guess)
     centred = chart_around(chart.task_map, chart.path, s, q, chart.rows)
     guess = replace(better.guess, joint_map=centred)
-    program = _program_like(better.program, guess)
+    program = program_like(better.program, guess)
     return replace(better, guess=guess, program=program)
 
 
@@ -209,8 +209,9 @@ def improve_over_path(
     UnreachableError
         The joint path leaves its joint map.
     """
-    better = improve_guess(guess, program, session, ROUGH)
-    return rank(better.guess, better.program, better.paths.reports)
+    better = improve_guess(guess, program.at_rest(), session, ROUGH)
+    program = program_like(program, better.guess) if program.flies else better.program
+    return rank(better.guess, program, better.paths.reports)
 
 
 def lay_along_timing(

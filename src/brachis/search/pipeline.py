@@ -59,6 +59,7 @@ from brachis.search.stages import (
     RankedCandidate,
     begin_candidate,
     fail,
+    faster,
     rank,
 )
 from brachis.search.verified import refine_and_verify
@@ -133,7 +134,13 @@ def finish_candidate(
     session = _open_session(candidate.guess, deadline.part(share), listener)
     finish = _finish_over_path if is_followed else _finish_over_time
     try:
-        return finish(candidate, session, options, to_beat)
+        outcome = finish(candidate, session, options, to_beat)
+        is_slow = not outcome.is_settled or outcome.t_end > candidate.estimate
+        if not (program.flies and is_slow):
+            return outcome
+        # The estimate is the time of a motion that stops between the parts.
+        at_rest = replace(candidate, program=program.at_rest())
+        return faster(outcome, finish(at_rest, session, options, to_beat))
     except UnreachableError as error:
         return fail(candidate, str(error))
 
@@ -196,8 +203,12 @@ def _finish_over_path(
     guess = candidate.guess
     program = candidate.program
     tolerance = guess.problem.task.spline.tolerance
-    paths = improve_joint_paths(program, guess.legs, session, tolerance, FINE)
+    at_rest = program.at_rest()
+    paths = improve_joint_paths(at_rest, guess.legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
+    if program.flies:
+        paths = improve_joint_paths(program, paths.curves, session, tolerance, FINE)
+        reports = (*reports, *paths.reports)
     session = shorten_solves(session)
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
@@ -221,11 +232,7 @@ def _finish_over_path(
             laid = replace(laid, optimum=retimed.solved)
         motions.append(laid)
     no_timing = replace(candidate, status=NO_TIMING)
-    return min(
-        motions,
-        key=lambda motion: (not motion.is_settled, motion.t_end),
-        default=no_timing,
-    )
+    return faster(*motions, no_timing)
 
 
 def _refine(

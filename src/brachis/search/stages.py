@@ -290,6 +290,13 @@ class Marks:
         return is_slow or self.adapted <= candidate.adapted < np.inf
 
 
+def faster(*candidates: Candidate) -> Candidate:
+    """Return the fastest candidate, and settled ones before all others."""
+    return min(
+        candidates, key=lambda candidate: (not candidate.is_settled, candidate.t_end)
+    )
+
+
 def round_end_time(time: float) -> float:
     """Round an end time, so that digits that differ between processes do not decide."""
     return float(f"{time:.6g}")

@@ -83,7 +83,7 @@ _OF_PATHS = {
     "path": (),
     "path_start": None,
     "path_frame": None,
-    "boundary": BoundarySettings(),
+    "boundary.periodic": False,
     "tool_limits.process_speed": (),
     **_CHOICES,
 }
@@ -231,6 +231,10 @@ class Task(CheckedModel):
             if self.program:
                 why = "a program states its paths in its parts"
             yield from self._changed(_OF_PATHS, why)
+            # The motion of a program may close in motion.
+            closes = not self.program or self.program[-1].flies
+            if any(self.boundary.given_speeds if closes else self.boundary.speeds):
+                yield "boundary", why, "no speeds"
             yield from find_mistakes(
                 self.program, self.order, self.start, self.end, self.postures
             )

@@ -60,6 +60,7 @@ class Part(Model):
     """Name of the part. Null: its kind and number."""
     events: tuple[Mark, ...] = ()
     """Events that are returned with their times."""
+
     @property
     def flies(self) -> bool:
         """Whether the arm passes on to the next part without a stop."""

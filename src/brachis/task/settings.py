@@ -373,7 +373,7 @@ def expand_solver_name(solver: object) -> object:
     return {"name": solver} if isinstance(solver, str) else solver
 
 
-FREE: Final = "free"
+FREE: Final[Literal["free"]] = "free"
 """Word for a speed that the planner chooses."""
 EndSpeed = Annotated[
     Literal["free"] | Annotated[NonNegative, Field(le=1e6)],
