@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import InputError, TaskError
-from brachis.problem.plausibility import of_task
+from brachis.problem.task_plausibility import of_task
 from brachis.robot.from_task import robot_for
 from brachis.scene import scene_of
 from support.command_line import code_of, interrupts_kept

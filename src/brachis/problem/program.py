@@ -104,8 +104,10 @@ class _Stretch:
 
     @property
     def key(self) -> str:
-        """Key of the first part, for messages."""
-        return f"program[{self.parts[0][0]}]"
+        """Key of the path or the move, for messages; of the first part if there is none."""
+        limited = [entry for entry in self.parts if isinstance(entry[1], LimitedPart)]
+        number, _ = (*limited, *self.parts)[0]
+        return f"program[{number}]"
 
     @property
     def end(self) -> Posture | str:
@@ -178,7 +180,7 @@ def _stretches(task: Task) -> Iterator[_Stretch]:
 def _free_stretches(task: Task) -> Iterator[_Stretch]:
     """Yield every path of a program whose order is free, with a move before, between and after them as needed."""
     payload = task.robot.payload
-    move = (0, MovePart(move=NEXT, name="move"))
+    move = (0, MovePart(move=NEXT, name="to the end"))
     for number, part in enumerate(task.program):
         if number or task.start != "free":
             yield _Stretch(payload, task.scene, [move])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from brachis.robot import Robot, dynamics
+from brachis.robot.plausibility import Issue
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,24 @@ class Event:
         return f"{self.name} at {self.time:.4f} s"
 
 
+def check_times(events: Sequence[Event], t_end: float) -> tuple[Issue, ...]:
+    """Find events before or after a motion that takes `t_end`, s: their leads are longer than what is around them."""
+    usual = f"0 to {t_end:.4f} s"
+    return tuple(
+        Issue(
+            f"events.{event.name}",
+            "the event is not during the motion",
+            f"{event.time:.4f} s",
+            usual,
+            "change its lead",
+        )
+        for event in events
+        if not -_ROUNDING <= event.time <= t_end + _ROUNDING
+    )
+
+
+_ROUNDING = 1e-9
+"""Time, s, by which an event at an end of the motion may be beyond it."""
 PART_COLUMNS = ("part", "kind", "time", "share")
 """Headings of the columns of `part_rows`."""
 

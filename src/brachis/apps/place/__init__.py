@@ -10,4 +10,12 @@ from brachis.apps.place.placing import (
 )
 from brachis.apps.place.search import WORKPIECE
 
-__all__ = ["WORKPIECE", "Placing", "Trial", "place", "read_range", "write_end_time", "write_task"]
+__all__ = [
+    "WORKPIECE",
+    "Placing",
+    "Trial",
+    "place",
+    "read_range",
+    "write_end_time",
+    "write_task",
+]
