@@ -43,8 +43,6 @@ _STILL = 1e-9
 """A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
-_FEWEST_NODES = 2
-"""Number of samples in a part of a program from which on there is a motion to check."""
 _DIVISORS = (2, 4, 8)
 """Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
@@ -243,16 +241,22 @@ class _Run:
         for begin, component in run.components:
             local = run.times - begin
             (rows,) = np.nonzero((local >= 0.0) & (local <= component.t_end))
-            if len(rows) < _FEWEST_NODES:
+            if len(rows) <= 1:  # there is no motion to check
                 continue
-            first = local[rows[0]]
             t = local[rows]
             plan = component.at(t)
-            times = t - first
-            nodes: dict[str, Any] = {}
-            for name in ("q", "qdot", "qddot", "qddot_before"):
+            times = t - t[0]
+            names = ("q", "qdot", "qddot", "qddot_before")
+            nodes = {name: getattr(run, name)[rows] for name in names}
+            if self.profile.is_sampled:
+                # Differences end with the part, whose payload the next part may not move.
+                period = run.times[1]
+                beyond = np.array([[t[0] - period], [t[-1] + period - component.t_end]])
+                ends = component.q[[0, -1]] + beyond * component.qdot[[0, -1]]
+                around = np.insert(ends[:, : run.q.shape[1]], 1, nodes["q"], axis=0)
+                nodes |= _differentiate(around, period)
+            for name, joints in nodes.items():
                 virtual = getattr(plan, name.removesuffix("_before"))
-                joints = getattr(run, name)[rows]
                 nodes[name] = np.hstack([joints, virtual[:, joints.shape[1] :]])
             inner = replace(
                 component,
@@ -263,7 +267,7 @@ class _Run:
                 phase_ends=times[-1:],
                 **nodes,
             )
-            yield begin + first, inner
+            yield begin + t[0], inner
 
     def _with_path(self, run: Trajectory) -> CheckedMotion:
         """Return a run with its path, for the checks."""
@@ -300,9 +304,8 @@ def interpolate(
     Parameters
     ----------
     motion : Trajectory
-        The plan.
     samples : Samples
-        Samples of the plan at K times.
+        Samples of the motion at K times.
     q : (K, n) ndarray
         Positions sent to the controller, rad or m.
     interpolation : {"hold", "linear", "cubic", "quintic"}
@@ -325,14 +328,19 @@ def interpolate(
         nodes["qddot_before"] = np.concatenate([begins[:1], ends])
     else:
         mirrored = np.pad(q, ((1, 1), (0, 0)), mode="reflect")
-        nodes["qdot"] = (mirrored[2:] - mirrored[:-2]) / (2.0 * t[1])
-        qddot = np.diff(mirrored, 2, axis=0) / t[1] ** 2
-        nodes |= {"qddot": qddot, "qddot_before": qddot}
+        nodes |= _differentiate(mirrored, t[1])
         # The plan may end before the last sample; its path coordinate is that of the samples, too.
         knots = np.pad(t / t[-1], 1, mode="edge")
         nodes |= {"knots": knots, "control_points": samples.s[None]}
         motion = replace(motion, degree=1, phase_ends=t[-1:])
     return replace(motion, **nodes)
+
+
+def _differentiate(q: np.ndarray, period: float) -> dict[str, np.ndarray]:
+    """Return velocities and accelerations, (K, n), by central differences of positions, (K + 2, n)."""
+    qddot = np.diff(q, 2, axis=0) / period**2
+    qdot = (q[2:] - q[:-2]) / (2.0 * period)
+    return {"qdot": qdot, "qddot": qddot, "qddot_before": qddot}
 
 
 def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
