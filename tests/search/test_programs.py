@@ -363,6 +363,13 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [{"move": "nowhere"}]}, "this posture is not defined"),
         ({"program": [SEAM, {"move": "next"}], "order": "free"}, "cannot be free"),
         ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
+        (
+            {
+                "scene": [{"sphere": 0.1, "since": "dwell 4", "until": "retract 5"}],
+                "collisions": {"mode": "avoid"},
+            },
+            r"scene\[0\].since: the arm does not move",
+        ),
         ({"program": [{"paht": [], "name": "a"}]}, r"key paht; .* mean 'path'"),
         (
             {"program": [{"move": "next"}, {"approach": 0.1}, {"path": SEAM["path"]}]},

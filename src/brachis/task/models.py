@@ -44,9 +44,11 @@ from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
 from brachis.task.program import (
     NEXT,
+    WAYS,
     ProgramPart,
     find_mistakes,
     part_names,
+    scene_during,
     with_task_space,
 )
 from brachis.task.scene import CollisionSettings, SceneBody, SceneSource, name_bodies
@@ -278,6 +280,17 @@ class Task(CheckedModel):
                     found=name,
                     allowed=", ".join(names)
                     or "null: only a program in a given order has times",
+                )
+        moving = [i for i, part in enumerate(self.program) if part.kind in WAYS]
+        for i, body in enumerate(self.scene):
+            if names and not any(
+                scene_during([body], self.program, number) for number in moving
+            ):
+                raise refuse(
+                    "the arm does not move while the body is there",
+                    key=f"scene[{i}].since",
+                    found=body.since,
+                    allowed="a body that is there during a path or a move",
                 )
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:

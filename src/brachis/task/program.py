@@ -34,7 +34,7 @@ from brachis.task.scene import SceneBody
 from brachis.task.settings import Payload
 from brachis.task.tolerances import TaskSpace, Tolerances
 
-_WAYS = ("path", "move", "approach", "retract")
+WAYS = ("path", "move", "approach", "retract")
 """Kinds of parts in which the arm moves."""
 NEXT = "next"
 """Word for the posture in which the next part begins best."""
@@ -263,7 +263,7 @@ def find_mistakes(
         yield from _find_mistakes_if_free(parts)
         return
     yield from _find_wrong_order(parts)
-    ways = [part for part in parts if part.kind in _WAYS]
+    ways = [part for part in parts if part.kind in WAYS]
     if ways and isinstance(ways[-1], MovePart):
         yield from _find_wrong_end(ways, start, end, postures)
 
@@ -316,8 +316,8 @@ def _find_wrong_end(
 
 def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
     """Yield the mistakes in the order of parts."""
-    kinds = [part.kind for part in parts if part.kind in _WAYS]
-    numbers = [i for i, part in enumerate(parts) if part.kind in _WAYS]
+    kinds = [part.kind for part in parts if part.kind in WAYS]
+    numbers = [i for i, part in enumerate(parts) if part.kind in WAYS]
     for number, before, kind, after in zip(
         numbers, [None, *kinds], kinds, [*kinds[1:], None], strict=False
     ):

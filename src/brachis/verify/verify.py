@@ -153,8 +153,10 @@ def _verify_program(
     verified = []
     for begin, component in trajectory.components:
         robot = _robot_of(component, motion)
+        # The first component warns of limits that are not checked.
+        checked = replace(component, own_limits=()) if verified else component
         part = verify_trajectory(
-            component, motion.options, robot=robot, own_limits=own_limits
+            checked, motion.options, robot=robot, own_limits=own_limits
         )
         verified.append(part)
         for check in part.checks:
