@@ -7,19 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from brachis.robot.joints import TURN
 from brachis.robot.plausibility import Issue, issue_above
-from brachis.task import (
-    LimitedPart,
-    PathPart,
-    SpeedTable,
-    Task,
-    ToolLimits,
-)
-from brachis.task.program import Part
-from brachis.task.segments import SegmentModel
+from brachis.task import SpeedTable, Task, ToolLimits
 
 _OR_NULL = ", or null for no limit"
 _OF_SIZE = " for an arm of this size"
@@ -97,13 +89,8 @@ def check_figure(
 
 
 def of_task(task: Task) -> tuple[Issue, ...]:
-    """Check a task's tool limits, bodies and angles, and the points that its path was fitted to."""
-    parts = [
-        issue
-        for number, part in enumerate(task.program)
-        for issue in _part(part, f"program[{number}].")
-    ]
-    return (*_tool(task), *parts, *_bodies(task), *_angles(task), *_fits(task))
+    """Check a task's tool limits, bodies and angles, its parts, and the points that its path was fitted to."""
+    return (*_parts(task), *_ends(task), *_bodies(task), *_angles(task), *_fits(task))
 
 
 def _fits(task: Task) -> Iterator[Issue]:
@@ -140,37 +127,25 @@ def _bodies(task: Task) -> Iterator[Issue]:
         )
 
 
-def _tool(task: Task) -> Iterator[Issue]:
-    """Check the tool limits, the dwells, and the speeds at both ends of the path."""
-    yield from _tool_limits(task.tool_limits)
-    yield from _dwells(task.path)
-    meant = "degrees per second" if task.task_space == "joints" else "mm/s"
-    message = f"the speed looks like {meant}"
-    for key in ("start_speed", "end_speed"):
-        value = _largest([getattr(task.boundary, key)])
-        yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
+def _parts(task: Task) -> Iterator[Issue]:
+    """Check the tool limits, lengths and times of a task, and of the parts of its program."""
+    parts = {f"program[{i}].": part for i, part in enumerate(task.program)}
+    for key, part in {"": task, **parts}.items():
+        limits = getattr(part, "tool_limits", None)
+        if limits is not None:
+            yield from _tool_limits(limits, key)
+        figures = [
+            ("path.dwell", f"path[{i}].dwell", segment.dwell)
+            for i, segment in enumerate(getattr(part, "path", ()))
+        ]
+        for name in ("approach", "retract", "dwell"):
+            usual = "path.dwell" if name == "dwell" else "approach"
+            figures.append((usual, name, getattr(part, name, 0.0)))
+        for usual, name, value in figures:
+            yield from check_figure(usual, value, where=f"{key}{name}")
 
 
-def _part(part: Part, key: str) -> Iterator[Issue]:
-    """Check the tool limits, times and lengths of a part of a program, whose key ends with a dot."""
-    if isinstance(part, LimitedPart) and part.tool_limits is not None:
-        yield from _tool_limits(part.tool_limits, key)
-    value = getattr(part, part.kind)
-    if isinstance(part, PathPart):
-        yield from _dwells(part.path, key)
-    elif isinstance(value, float):
-        usual = "path.dwell" if part.kind == "dwell" else "approach"
-        yield from check_figure(usual, value, where=f"{key}{part.kind}")
-
-
-def _dwells(path: Sequence[SegmentModel], key: str = "") -> Iterator[Issue]:
-    """Check the dwells along a path."""
-    for i, segment in enumerate(path):
-        where = f"{key}path[{i}].dwell"
-        yield from check_figure("path.dwell", segment.dwell, where=where)
-
-
-def _tool_limits(limits: ToolLimits, key: str = "") -> Iterator[Issue]:
+def _tool_limits(limits: ToolLimits, key: str) -> Iterator[Issue]:
     """Check the highest tool limit of each kind; feed rates are left out, as they have their own units."""
     speed = limits.speed
     values = {
@@ -182,6 +157,15 @@ def _tool_limits(limits: ToolLimits, key: str = "") -> Iterator[Issue]:
     for kind, figures in values.items():
         name = f"tool_limits.{kind}"
         yield from check_figure(name, _largest(figures), where=f"{key}{name}")
+
+
+def _ends(task: Task) -> Iterator[Issue]:
+    """Check the speeds at both ends of the path."""
+    meant = "degrees per second" if task.task_space == "joints" else "mm/s"
+    message = f"the speed looks like {meant}"
+    for key in ("start_speed", "end_speed"):
+        value = _largest([getattr(task.boundary, key)])
+        yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
 
 
 def _largest(values: Iterable[float | None]) -> float:

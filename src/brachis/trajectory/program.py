@@ -61,22 +61,15 @@ class Event:
 
 def check_times(events: Sequence[Event], t_end: float) -> tuple[Issue, ...]:
     """Find events before or after a motion that takes `t_end`, s: their leads are longer than what is around them."""
-    usual = f"0 to {t_end:.4f} s"
+    message = "the event is not during the motion"
+    usual = f"0 to {t_end:.4f} s; change its lead"
     return tuple(
-        Issue(
-            f"events.{event.name}",
-            "the event is not during the motion",
-            f"{event.time:.4f} s",
-            usual,
-            "change its lead",
-        )
+        Issue(f"events.{event.name}", message, f"{event.time:.4f} s", usual)
         for event in events
-        if not -_ROUNDING <= event.time <= t_end + _ROUNDING
+        if not 0.0 <= round(event.time, 9) <= round(t_end, 9)
     )
 
 
-_ROUNDING = 1e-9
-"""Time, s, by which an event at an end of the motion may be beyond it."""
 PART_COLUMNS = ("part", "kind", "time", "share")
 """Headings of the columns of `part_rows`."""
 
