@@ -163,9 +163,10 @@ def _ends(task: Task) -> Iterator[Issue]:
     """Check the speeds at both ends of the path."""
     meant = "degrees per second" if task.task_space == "joints" else "mm/s"
     message = f"the speed looks like {meant}"
-    for key in ("start_speed", "end_speed"):
-        value = _largest([getattr(task.boundary, key)])
-        yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
+    for name, speed in zip(("start", "end"), task.boundary.given_speeds, strict=True):
+        key = f"boundary.{name}_speed"
+        value = _largest([speed])
+        yield from issue_above(key, message, value, 50.0, task.speed_unit)
 
 
 def _largest(values: Iterable[float | None]) -> float:

@@ -239,7 +239,7 @@ class _ChainSearch:
             options.append(_Option(np.array([problem.end] * 2)))
         elif problem.is_closed:
             options.append(_Option(options[0].ends[[0, 0]]))
-        search = replace(self, problem=problem.reordered(order))
+        search = replace(self, problem=problem.only(order))
         return search.guess_of(_Chain(tuple(options), chain.time), range(len(order)))
 
     def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
