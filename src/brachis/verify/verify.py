@@ -151,7 +151,7 @@ def _verify_program(
     """
     trajectory = motion.trajectory
     worst: dict[str, Check] = {}
-    verified = []
+    verified: list[Verification] = []
     for begin, component in trajectory.components:
         robot = _robot_of(component, motion)
         # The first component warns of limits that are not checked.
