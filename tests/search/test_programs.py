@@ -20,6 +20,7 @@ from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.order import find_orders
 from brachis.task import scene_during
+from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
 
@@ -231,6 +232,20 @@ def test_a_given_speed_is_held_in_a_program():
     # The joints of a gantry are the coordinates of its tool.
     speeds = np.linalg.norm(result.trajectory.velocity(begin + t), axis=1)
     np.testing.assert_allclose(speeds, 0.5, rtol=1e-6)
+
+
+def test_pairs_of_a_body_that_is_there_for_a_time_can_be_left_out():
+    post = {"name": "post", "sphere": 0.02, "position": [0.3, 0.2, 0.0]}
+    task = {
+        **GANTRY_CYCLE,
+        "scene": [{**post, "until": "payload 4"}],
+        "collisions": {
+            "capsules": "auto",
+            "self_collision": False,
+            "disable": [[name, "post"] for name in ("base", "bridge", "tool")],
+        },
+    }
+    assert brachis.plan(task).verified
 
 
 def test_bodies_are_there_between_their_parts():

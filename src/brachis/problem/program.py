@@ -64,9 +64,9 @@ def bind_task(
     boundary = task.boundary.model_copy(
         update={"start_speed": closing, "end_speed": closing}
     )
-    whole_task = task.model_copy(update={"scene": lasting, "boundary": boundary})
-    whole = Problem.of(robot, whole_task, own_limits)
-    whole = replace(whole, task=task.model_copy(update={"boundary": boundary}))
+    bounded = task.model_copy(update={"boundary": boundary})
+    whole = Problem.of(robot, bounded.with_scene(lasting), own_limits)
+    whole = replace(whole, task=bounded)
     ends = [stretch.end for stretch in stretches]
     if ends[-1] == "free":
         ends[-1] = task.start if task.end == "start" else task.end
@@ -234,14 +234,12 @@ def _task_of(
             where=stretch.key,
             allowed="a path in place of the approach or retract",
         )
+    task = task.with_scene(stretch.scene)
     limited = stretch.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
         "order": "given",
         "robot": robot.settings,
-        "scene": stretch.scene,
-        # A scene may be empty during a part: the mode is that of the whole program.
-        "collisions": task.collisions.model_copy(update={"mode": task.collision_mode}),
         **stated,
         "tool_limits": limited.tool_limits or task.tool_limits,
     }

@@ -6,7 +6,7 @@ alike, and reports a mistake as a `brachis.errors.TaskError` that names the key.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import Annotated, Any, Literal
 
@@ -415,6 +415,16 @@ class Task(CheckedModel):
         if self.collisions.mode != "auto":
             return self.collisions.mode
         return "avoid" if self.scene else "off"
+
+    def with_scene(self, bodies: Sequence[SceneBody]) -> Task:
+        """Return the task with some of its bodies, which are always there, and its treatment of collisions."""
+        always = {"since": None, "until": None}
+        scene = tuple(body.model_copy(update=always) for body in bodies)
+        absent = {body.name for body in self.scene} - {body.name for body in scene}
+        disable = [pair for pair in self.collisions.disable if absent.isdisjoint(pair)]
+        changes = {"mode": self.collision_mode, "disable": tuple(disable)}
+        collisions = self.collisions.model_copy(update=changes)
+        return self.model_copy(update={"scene": scene, "collisions": collisions})
 
     @property
     def of_poses(self) -> bool:

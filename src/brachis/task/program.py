@@ -220,8 +220,7 @@ def scene_during(
         end = len(names) if body.until is None else names.index(body.until)
         return begin <= number < end
 
-    always = {"since": None, "until": None}
-    return tuple(body.model_copy(update=always) for body in scene if is_there(body))
+    return tuple(filter(is_there, scene))
 
 
 def path_keys(part: PathPart) -> dict[str, Any]:

@@ -246,17 +246,13 @@ class _Run:
             t = local[rows]
             plan = component.at(t)
             times = t - t[0]
-            names = ("q", "qdot", "qddot", "qddot_before")
-            nodes = {name: getattr(run, name)[rows] for name in names}
-            if self.profile.is_sampled:
-                # Differences end with the part, whose payload the next part may not move.
-                period = run.times[1]
-                beyond = np.array([[t[0] - period], [t[-1] + period - component.t_end]])
-                ends = component.q[[0, -1]] + beyond * component.qdot[[0, -1]]
-                around = np.insert(ends[:, : run.q.shape[1]], 1, nodes["q"], axis=0)
-                nodes |= _differentiate(around, period)
-            for name, joints in nodes.items():
+            nodes: dict[str, Any] = {}
+            for name in ("q", "qdot", "qddot", "qddot_before"):
                 virtual = getattr(plan, name.removesuffix("_before"))
+                joints = getattr(run, name)[rows]
+                if self.profile.is_sampled and name != "q":
+                    # Differences at an end would be those of two parts.
+                    joints[[0, -1]] = virtual[[0, -1], : joints.shape[1]]
                 nodes[name] = np.hstack([joints, virtual[:, joints.shape[1] :]])
             inner = replace(
                 component,
@@ -304,8 +300,9 @@ def interpolate(
     Parameters
     ----------
     motion : Trajectory
+        The plan.
     samples : Samples
-        Samples of the motion at K times.
+        Samples of the plan at K times.
     q : (K, n) ndarray
         Positions sent to the controller, rad or m.
     interpolation : {"hold", "linear", "cubic", "quintic"}
@@ -328,19 +325,14 @@ def interpolate(
         nodes["qddot_before"] = np.concatenate([begins[:1], ends])
     else:
         mirrored = np.pad(q, ((1, 1), (0, 0)), mode="reflect")
-        nodes |= _differentiate(mirrored, t[1])
+        nodes["qdot"] = (mirrored[2:] - mirrored[:-2]) / (2.0 * t[1])
+        qddot = np.diff(mirrored, 2, axis=0) / t[1] ** 2
+        nodes |= {"qddot": qddot, "qddot_before": qddot}
         # The plan may end before the last sample; its path coordinate is that of the samples, too.
         knots = np.pad(t / t[-1], 1, mode="edge")
         nodes |= {"knots": knots, "control_points": samples.s[None]}
         motion = replace(motion, degree=1, phase_ends=t[-1:])
     return replace(motion, **nodes)
-
-
-def _differentiate(q: np.ndarray, period: float) -> dict[str, np.ndarray]:
-    """Return velocities and accelerations, (K, n), by central differences of positions, (K + 2, n)."""
-    qddot = np.diff(q, 2, axis=0) / period**2
-    qdot = (q[2:] - q[:-2]) / (2.0 * period)
-    return {"qdot": qdot, "qddot": qddot, "qddot_before": qddot}
 
 
 def _check_path(motion: CheckedMotion, profile: Profile) -> Check:

@@ -93,6 +93,8 @@ class ViewerScene:
         for k, handle in enumerate(self._frames):
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
+        for begin, end, handle in self._passing:
+            handle.visible = begin <= t < end
         begins = [begin for begin, _ in self._trajectory.components[1:]]
         cell = self._cells[int(np.searchsorted(begins, t, side="right"))]
         if cell is not None and len(cell.pairs):
@@ -123,6 +125,12 @@ class ViewerScene:
         """Attach the links and the skeleton to the frames of the joints, with one asset per joint and layer."""
         import trimesh
 
+        self._passing = []
+        for number, (begin, end, bodies) in enumerate(self.bodies.passing):
+            for joint, meshes in bodies.items():
+                asset = trimesh.Scene(meshes).export(file_type="glb")
+                handle = self._api.add_glb(f"/joint {joint}/passing {number}", asset)
+                self._passing.append((begin, end, handle))
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
         for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
