@@ -1,15 +1,15 @@
 """The viewer of a program: a list of parts and events to go to, and the paths of all parts."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import brachis
 from brachis.apps.view import Viewer
 from brachis.apps.view.bodies import prescribed_path
 from brachis.apps.view.tables import state_table
-from brachis.task import task_with
+from support.cycle import CYCLE
 
 pytest.importorskip("viser", reason="viser is not installed")
 
@@ -52,18 +52,18 @@ def test_a_choice_shows_its_instant_and_pauses(shown, cycle, number):
     assert shown._state.content == state_table(motion, now)
 
 
-def test_bodies_appear_and_disappear_with_the_parts(cycle):
+def test_bodies_appear_and_disappear_with_the_parts():
     bodies = [
         {"name": "lasting", "sphere": 0.02, "position": [3, 0, 0]},
         {"name": "early", "sphere": 0.02, "position": [3, 1, 0], "until": "bead"},
         {"name": "late", "sphere": 0.02, "position": [3, 2, 0], "since": "payload 4"},
     ]
     collisions = {"mode": "check", "capsules": "auto"}
-    task = task_with(cycle.task, scene=bodies, collisions=collisions)
-    motion = replace(cycle.trajectory, task=task)
+    result = brachis.plan({**CYCLE, "scene": bodies, "collisions": collisions})
+    motion = result.trajectory
     _, bead, dwell, _ = motion.parts
     with Viewer(motion, verified=True, port=0) as viewer:
-        handles = [handle for _, _, handle in viewer._scene._passing]
+        handles = [handle for _, handle in viewer._scene._passing]
         for t, shown in (
             (0.0, [True, False]),
             (bead.begin, [False, False]),

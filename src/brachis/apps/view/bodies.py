@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,6 @@ from brachis.robot.chain import path_frame_in_world
 from brachis.robot.urdf_elements import Element, read_tree
 from brachis.scene import Solid, scene_of
 from brachis.scene.chain import Chain
-from brachis.task import part_names
 from brachis.task.scene import SceneBody
 from brachis.trajectory import Samples, Trajectory
 
@@ -220,8 +219,8 @@ class Bodies:
     ----------
     links : dict of int to list of Trimesh
         Visual shapes of the URDF and bodies of the scene; joint 0 is the frame of the paths.
-    passing : list of (float, float, dict of int to list of Trimesh)
-        Bodies that are there for a time, with the times at which they appear and disappear, s.
+    passing : dict of str to dict of int to list of Trimesh
+        Bodies of the scene, by name, that are there only during some parts of a program.
     skeleton : dict of int to list of Trimesh
         Shapes for the joints and for the straight lines between them.
     unread : tuple of str
@@ -233,7 +232,7 @@ class Bodies:
     """
 
     links: Meshes
-    passing: list[tuple[float, float, Meshes]]
+    passing: dict[str | None, Meshes]
     skeleton: Meshes
     unread: tuple[str, ...]
     box: np.ndarray
@@ -258,7 +257,13 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
         links[int(frame.parentJoint)] += meshes
-    lasting = [body for body in trajectory.task.scene if body.since == body.until]
+    lasting = []
+    passing = {}
+    for body in trajectory.task.scene:
+        if body.since == body.until:
+            lasting.append(body)
+        else:
+            passing[body.name] = scene_meshes(trajectory, [body])
     for joint, meshes in scene_meshes(trajectory, lasting).items():
         links[joint] += meshes
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
@@ -279,7 +284,6 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         np.array([points.min(axis=0), points.max(axis=0)])
         for points in map(np.concatenate, (still + moving, moving))
     )
-    passing = list(_passing_bodies(trajectory))
     return Bodies(links, passing, skeleton, tuple(unread), box, moving_box)
 
 
@@ -330,21 +334,6 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
             s = np.clip(component.path_coordinate(t), 0.0, 1.0)
             points[rows[:, None], axes] = path.sample(s).target[:, : len(axes)]
     return points
-
-
-def _passing_bodies(trajectory: Trajectory) -> Iterator[tuple[float, float, Meshes]]:
-    """Yield the bodies that are there for a time; see `Bodies`."""
-    begins: dict[str | None, float] = {None: np.inf}
-    begin = trajectory.t_end
-    times = {part.name: part.begin for part in trajectory.parts}
-    # A change of the payload takes no time: it is at the start of the next part.
-    for name in reversed(part_names(trajectory.task.program)):
-        begin = times.get(name, begin)
-        begins[name] = begin
-    for body in trajectory.task.scene:
-        if body.since != body.until:
-            first = begins[body.since] if body.since else 0.0
-            yield first, begins[body.until], scene_meshes(trajectory, [body])
 
 
 def scene_meshes(trajectory: Trajectory, bodies: Sequence[SceneBody]) -> Meshes:
