@@ -30,10 +30,10 @@ from brachis.problem.plausibility import (
     of_end_time,
     of_places,
     of_robot,
-    of_task,
 )
 from brachis.problem.problem import Decompositions, Problem, decompositions_of
 from brachis.problem.program import bind_task
+from brachis.problem.task_plausibility import of_task
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
@@ -58,6 +58,7 @@ from brachis.task import (
 )
 from brachis.timing import SlowTimingWarning, find_timing_gap
 from brachis.trajectory import MotionSource, motion_of
+from brachis.trajectory.program import check_times
 
 RobotOrTask = Source | Robot | None
 """A robot or a task; either may be given as a file name."""
@@ -183,6 +184,9 @@ def plan(
             end_time = of_end_time(best.t_end, SHORTEST_TIME)
             remarks += report_issues(end_time, strict=loaded_task.strict)
             motion = best if smoothed is None else smoothed
+            events = check_times(motion.trajectory.events, best.t_end)
+            # A motion that is known is not refused.
+            remarks += report_issues(events, strict=False)
             gap = None
             if not (deadline.passed or problem.is_chain):
                 gap = find_timing_gap(motion.trajectory, problem.limits)
@@ -227,13 +231,12 @@ def _open_search(
 ) -> Search:
     """Open the search for a problem whose path is within reach."""
     decompositions = Decompositions(problem, families)
-    if not problem.task_map.is_of_tool:
-        return Search(problem, decompositions, deadline, report)
-    if has_charts(problem, decompositions):
-        check_regular(problem.task, problem.task_map, problem.given_postures)
-    else:
-        # Decompositions are computed here, so that errors in them are reported before the path is checked.
-        len(decompositions)
+    if problem.task_map.is_of_tool:
+        if has_charts(problem, decompositions):
+            check_regular(problem.task, problem.task_map, problem.given_postures)
+        else:
+            # Decompositions are computed here, so that errors in them are reported before the path is checked.
+            len(decompositions)
     check_within_reach(problem)
     return Search(problem, decompositions, deadline, report)
 

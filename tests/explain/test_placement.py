@@ -101,6 +101,18 @@ def test_a_heavier_payload_costs_what_its_gradient_says(line):
     assert found > 0.0
 
 
+def test_paths_in_a_frame_turn_about_the_same_point_as_paths_in_the_world():
+    """A frame at the world's origin changes nothing."""
+    task = {key: value for key, value in LINE.items() if key != "frames"}
+    task |= {"path_start": [1.2, -0.3], "path": [{"line": {"by": [0.2, 0.6]}}]}
+    frames = {"origin": {"xyz": [0.0, 0.0, 0.0]}}
+    in_frame = brachis.plan({**task, "frames": frames, "path_frame": "origin"})
+    in_world = brachis.plan(task, start_from=in_frame)
+    turned = derivative(in_world, "path", "yaw")
+    assert derivative(in_frame, "origin", "yaw") == pytest.approx(turned, rel=0.01)
+    assert abs(turned) > 0.02
+
+
 def test_the_base_moves_against_the_workpiece(line):
     """A turn about the vertical first axis changes nothing, because that joint has no end here."""
     for axis in "xy":

@@ -91,6 +91,17 @@ def test_an_object_limits_the_motion(plugin, tmp_path):
     assert not verify_trajectory(free.trajectory, own_limits=[model]).passed
 
 
+def test_a_program_warns_once_of_a_limit_that_is_not_checked(plugin):
+    model = plugin.CoupledRange(("j2", "j3"), -3.0, 3.0)
+    moves = [{"move": {"joints": [0.3, 0.2, x]}} for x in (0.2, 0.3)]
+    result = brachis.plan(
+        "scara3", program=moves, start=[0.2, 0.2, 0.2], own_limits=[model], **QUICK
+    )
+    with pytest.warns(brachis.errors.BrachisWarning) as caught:
+        verify_trajectory(result.trajectory)
+    assert len(caught) == 1
+
+
 @pytest.mark.usefixtures("entry_point")
 def test_a_task_file_names_it():
     result = brachis.plan(TASK, **QUICK)

@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 import brachis
 from brachis import LimitSpec
 from brachis.errors import BrachisError, PathError, PlausibilityError, StartError
-from brachis.problem.plausibility import of_end_time, of_robot, of_task
+from brachis.problem.plausibility import of_end_time, of_robot
+from brachis.problem.task_plausibility import of_task
 from brachis.robot import Robot
 from brachis.robot.plausibility import refuse_issues
 from brachis.robot.urdf import default_chain, read_file

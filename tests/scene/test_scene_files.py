@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import brachis
 from brachis.errors import InputError, TaskError
-from brachis.problem.plausibility import of_task
+from brachis.problem.task_plausibility import of_task
 from brachis.robot.from_task import robot_for
 from brachis.scene import scene_of
 from support.command_line import code_of, interrupts_kept
@@ -210,7 +210,7 @@ def test_the_viewer_draws_the_bodies_where_they_are(line_trajectory):
     q = np.array([TASK["start"]["joints"]] * 2)
     motion = motion_between(line_trajectory, brachis.robots.iiwa14, q)
     task = brachis.load_task({**TASK, "scene": scene})
-    meshes = scene_meshes(replace(motion, task=task))
+    meshes = scene_meshes(replace(motion, task=task), task.scene)
     assert {joint: len(solids) for joint, solids in meshes.items()} == {0: 2, 7: 1}
     box, floor = meshes[0]
     assert isinstance(box, trimesh.Trimesh)

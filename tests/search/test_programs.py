@@ -4,6 +4,7 @@ The full count of programs is `benchmarks/programs.py`.
 """
 
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -16,8 +17,10 @@ from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for
+from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.order import find_orders
 from brachis.task import scene_during
+from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
 
@@ -231,6 +234,20 @@ def test_a_given_speed_is_held_in_a_program():
     np.testing.assert_allclose(speeds, 0.5, rtol=1e-6)
 
 
+def test_pairs_of_a_body_that_is_there_for_a_time_can_be_left_out():
+    post = {"name": "post", "sphere": 0.02, "position": [0.3, 0.2, 0.0]}
+    task = {
+        **GANTRY_CYCLE,
+        "scene": [{**post, "until": "payload 4"}],
+        "collisions": {
+            "capsules": "auto",
+            "self_collision": False,
+            "disable": [[name, "post"] for name in ("base", "bridge", "tool")],
+        },
+    }
+    assert brachis.plan(task).verified
+
+
 def test_bodies_are_there_between_their_parts():
     parts = brachis.Program(
         [{"move": "next"}, {**SEAM, "name": "lower"}, {"dwell": 0.1, "name": "grip"}]
@@ -346,6 +363,8 @@ def test_a_free_order_visits_seams_along_the_way():
     assert result.verified
     names = [part.name for part in result.trajectory.parts if part.kind == "path"]
     assert names == ["at 0.3", "at 0.9", "at 1.5"]
+    moves = [part.name for part in result.trajectory.parts if part.kind == "move"]
+    assert moves == ["to at 0.3", "to at 0.9", "to at 1.5", "to the end"]
 
 
 @pytest.mark.parametrize(
@@ -359,6 +378,18 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [{"move": "nowhere"}]}, "this posture is not defined"),
         ({"program": [SEAM, {"move": "next"}], "order": "free"}, "cannot be free"),
         ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
+        (
+            {
+                "scene": [{"sphere": 0.1, "since": "dwell 4", "until": "retract 5"}],
+                "collisions": {"mode": "avoid"},
+            },
+            r"scene\[0\].since: the arm does not move",
+        ),
+        ({"program": [{"paht": [], "name": "a"}]}, r"key paht; .* mean 'path'"),
+        (
+            {"program": [{"move": "next"}, {"approach": 0.1}, {"path": SEAM["path"]}]},
+            r"program\[2\]: path_start",
+        ),
     ],
 )
 def test_wrong_programs_are_refused(changes, text):
@@ -371,9 +402,36 @@ def test_a_move_from_nowhere_is_refused():
         brachis.plan("iiwa14", **{**CYCLE, "start": "free", "end": "free"})
 
 
-def test_a_seam_out_of_reach_is_named():
-    far = {**SEAM, "path_start": {"position": [2.5, 0, 0.4], "rpy_deg": [180, 0, 0]}}
-    with pytest.raises(PathError, match="seam"):
-        brachis.plan(
-            "iiwa14", **{**CYCLE, "end": "free", "program": [{"move": "next"}, far]}
-        )
+@pytest.mark.parametrize(
+    "y, text",
+    [
+        (2.5, "m away from the robot's first joint"),
+        (0.75, "out of reach from s = 0 on"),
+    ],
+)
+def test_a_seam_out_of_reach_is_named_and_explained_like_a_single_path(y, text):
+    path_start = {"position": [0.5, y, 0.4], "rpy_deg": [180, 0, 0]}
+    far = {**SEAM, "path": [{"line": {"by": [0, 0.2, 0]}}], "path_start": path_start}
+    program = [{"move": "next"}, SEAM, {"move": "next"}, {**far, "name": "far"}]
+    began = time.perf_counter()
+    with pytest.raises(PathError, match=text) as error:
+        brachis.plan("iiwa14", **{**CYCLE, "end": "free", "program": program})
+    assert "program: far: path, s in [0, 1]" in str(error.value)
+    assert error.value.hint
+    if y == 2.5:
+        # No path was searched.
+        assert time.perf_counter() - began < 2.0
+
+
+def test_events_outside_the_motion_are_told(slide):
+    early = {"name": "arc_on", "lead": 0.02}
+    late = {"name": "arc_off", "at": "end", "lead": -0.01}
+    moves = [
+        {"move": {"joints": [0.5]}, "events": [early]},
+        {"move": {"joints": [0.7]}, "events": [late, {**early, "name": "gas_on"}]},
+    ]
+    with pytest.warns(PlausibilityWarning, match="not during the motion"):
+        result = plan_slide(slide, moves, start=[0.0], strict=True)
+    (issue,) = result.warnings
+    late_time = f"{result.t_end + 0.01:.4f}"
+    assert issue.found == f"arc_on -0.0200 s, arc_off {late_time} s"

@@ -92,5 +92,11 @@ def test_programs_with_a_free_order_are_saved_with_the_order_that_was_chosen(tmp
     result.save(tmp_path / "cycle.npz")
     loaded = brachis.Trajectory.load(tmp_path / "cycle.npz")
     assert loaded.parts == result.trajectory.parts
-    assert {part.name for part in loaded.parts} == {"move", "near", "far"}
+    assert {part.name for part in loaded.parts} == {
+        "to near",
+        "near",
+        "to far",
+        "far",
+        "to the end",
+    }
     assert brachis.verify_trajectory(loaded).passed

@@ -74,18 +74,22 @@ def transform_about(change: Mapping[str, float], pivot: np.ndarray) -> SE3:
 
 
 def pivot_of(problem: Problem, subject: str) -> np.ndarray:
-    """Return the point about which something movable is turned, (3,), m."""
+    """Return the point about which something movable is turned, (3,), m.
+
+    It is the origin of the base, or the mean of the points where the paths begin that move; without such a path, it is
+    the origin of the frame. It moves with the subject, and does not depend on the order of the paths.
+    """
     if subject == BASE:
         return np.array(problem.robot.settings.mounting.xyz)
-    if subject != PATH:
+    carried = [part for part in problem.parts if _moves_with(part, subject)]
+    if not carried:
         return np.array(place_frame(problem.task.frames, subject).xyz)
-    part = next(part for part in problem.parts if _moves_with(part, PATH))
-    rows = position_rows(part.task_map.rows)
-    pivot = np.zeros(3)
-    pivot[[AXES.index(row) for row in rows]] = part.path.sample([0.0]).target[
-        0, : len(rows)
-    ]
-    return pivot
+    points = np.zeros((len(carried), 3))
+    for point, part in zip(points, carried, strict=True):
+        rows = position_rows(part.task_map.rows)
+        target = part.path.sample([0.0]).target[0, : len(rows)]
+        point[[AXES.index(row) for row in rows]] = target
+    return np.asarray(points.mean(axis=0))
 
 
 def move_in_task(task: Task, subject: str, transform: SE3) -> Task:

@@ -103,12 +103,19 @@ class ProblemChain(Problem):
         return flights
 
     def only(self, numbers: Sequence[int]) -> ProblemChain:
-        """Return the chain of some of the parts, or of all in another order."""
+        """Return the chain of some of the parts, or of all in another order.
+
+        In a free order, moves are named after the paths to which they lead.
+        """
         chained = tuple(self.chained[number] for number in numbers)
+        sections = [self.sections[number] for number in numbers]
+        for number, ((first, *_), (after, *_)) in enumerate(pairwise(sections)):
+            if first.kind == "move" and self.task.order == "free":
+                sections[number] = (replace(first, name=f"to {after.name}"),)
         return replace(
             self,
             chained=chained,
-            sections=tuple(self.sections[number] for number in numbers),
+            sections=tuple(sections),
             legs=tuple(leg for part in chained for leg in part.legs),
             time_laws=tuple(law for part in chained for law in part.time_laws),
         )
@@ -122,6 +129,11 @@ class ProblemChain(Problem):
     def parts(self) -> tuple[Problem, ...]:
         """The problems whose motions follow one another."""
         return self.chained
+
+    def key_of(self, number: int) -> str:
+        """Return the key of the path of a part, for messages."""
+        names = [part.name for part in self.sections[number] if part.kind == "path"]
+        return f"program: {names[0]}: path" if names else "program"
 
     def with_part(self, number: int, part: Problem) -> Problem:
         """Return the program with another part in place of the part with a number."""

@@ -1,13 +1,12 @@
-"""Checks for implausible figures in a task or a robot: an unusually large figure may be in the wrong unit.
+"""Checks for implausible figures of a robot and along its path: an unusually large figure may be in the wrong unit.
 
-`USUAL` lists the largest usual figures; the figures for joint limits are in `brachis.task.LIMIT_KINDS`.
+The largest usual figures are in `task_plausibility`; those for joint limits are in `brachis.task.LIMIT_KINDS`.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ import pinocchio as pin
 
 from brachis.common.words import write_apart
 from brachis.errors import PathError
+from brachis.problem.task_plausibility import USUAL, check_figure
 from brachis.robot import Robot, TaskMap
 from brachis.robot.joints import TURN, UNITS
 from brachis.robot.plausibility import (
@@ -31,7 +31,7 @@ from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import ANGLES
 from brachis.robot.urdf_bodies import inertia_matrix, mass_of
 from brachis.robot.urdf_elements import read_tree
-from brachis.task import LIMIT_KINDS, SpeedTable, Task
+from brachis.task import LIMIT_KINDS
 from brachis.task.limit_kinds import FASTEST, UsualLimit
 from brachis.task.points.points import steps_of
 
@@ -39,113 +39,14 @@ if TYPE_CHECKING:
     from brachis.path import Path
     from brachis.problem.problem import Problem
 
-_OR_NULL = ", or null for no limit"
-_OF_SIZE = " for an arm of this size"
-_OF_MASS = " for this mass"
-USUAL = {
-    # Delta robots move at 10 m/s and accelerate at 15 g.
-    "tool_limits.speed": ("the limit looks like mm/s", 50.0, "m/s", _OR_NULL),
-    "tool_limits.process_speed": ("the speed looks like mm/s", 50.0, "m/s", ""),
-    "tool_limits.acceleration": (
-        "the limit looks like mm/s^2",
-        300.0,
-        "m/s^2",
-        _OR_NULL,
-    ),
-    "tool_limits.angular_speed": (
-        "the limit looks like degrees per second",
-        60.0,
-        "rad/s",
-        _OR_NULL,
-    ),
-    "path_start": ("the angle looks like degrees", TURN, "rad", ""),
-    "path": ("the turn of the angle looks like degrees", 2.0 * TURN, "rad", ""),
-    "path.dwell": ("the time looks like ms", 100.0, "s", ""),
-    "link": ("the distance from the previous joint looks like mm", 20.0, "m", ""),
-    # This figure is multiplied by the arm's length.
-    "robot.tool_offset.xyz": ("the distance looks like mm", 2.0, "m", _OF_SIZE),
-    "robot.mounting.xyz": ("the distance looks like mm", 200.0, "m", ""),
-    "scene": ("the length looks like mm", 30.0, "m", ""),
-    "collisions": ("the length looks like mm", 0.5, "m", ""),
-    "robot.gravity": ("the acceleration looks like mm/s^2", 100.0, "m/s^2", ""),
-    # The strongest arms with a reach of 1 m carry 130 kg; the payload grows with the square of the reach.
-    "robot.payload.mass": ("the mass looks like g", 150.0, "kg", _OF_SIZE),
-    # This figure is multiplied by the arm's length.
-    "robot.payload.com": (
-        "the distance from the tool frame looks like mm",
-        1.0,
-        "m",
-        _OF_SIZE,
-    ),
-    # This figure is multiplied by the mass and by the square of the arm's length.
-    "robot.payload.inertia": (
-        "the inertia looks like kg mm^2",
-        1.0,
-        "kg m^2",
-        _OF_MASS,
-    ),
-    # In the heaviest arms, one body weighs 150 kg times the square of the reach in metres.
-    "body mass": ("the mass looks like g", 1e3, "kg", _OF_SIZE),
-    # This figure is multiplied by the mass; it is that of bodies 10 m wide.
-    "body inertia": ("the inertia looks like kg mm^2", 100.0, "kg m^2", _OF_MASS),
-    # This is the moment of inertia of 1 g at 10 cm; smaller moments hardly change the torques.
-    "massless inertia": (
-        "moments of inertia without mass are left out",
-        1e-5,
-        "kg m^2",
-        ", or a mass > 0 kg",
-    ),
-}
-"""For each key of the task or part of the robot: the warning about a larger figure, the largest usual figure, its unit,
-and a remark on it. Some of the largest figures are relative to the size or the mass of the robot.
-"""
-
-
-def _figure(
-    key: str, value: float, scale: float = 1.0, where: str = ""
-) -> Iterator[Issue]:
-    """Compare a value with `scale` times the largest usual value."""
-    message, largest, unit, aside = USUAL[key]
-    return issue_above(where or key, message, value, largest * scale, unit, aside)
-
-
-def of_task(task: Task) -> tuple[Issue, ...]:
-    """Check a task's tool limits, bodies and angles, and the points that its path was fitted to."""
-    return (*_tool(task), *_bodies(task), *_angles(task), *_fits(task))
-
-
-def _fits(task: Task) -> Iterator[Issue]:
-    """Check the points that the path was fitted to, and the permitted distance of the path from them."""
-    for fit in task.fits:
-        where = f"path: {fit.source}"
-        if fit.doubt:
-            usual = "a path within the robot's reach"
-            yield Issue(where, fit.doubt, f"{fit.length:.4g} m", usual)
-        tolerance = fit.position_tolerance
-        # Even the coarsest scans scatter by only a few mm.
-        yield from issue_above(
-            f"{where}: tolerance.position",
-            "the tolerance looks like mm",
-            tolerance,
-            5e-3,
-            "m",
-            advice=f"{tolerance:.6g} m are {1e3 * tolerance:.6g} mm; write '{tolerance:.6g} mm' for mm",
-        )
-
-
-def _bodies(task: Task) -> Iterator[Issue]:
-    """Compare the sizes and positions of a scene's bodies, and the clearances around them, with a large robot cell."""
-    for body in task.scene:
-        largest = max(body.size, *map(abs, body.position))
-        yield from _figure("scene", largest, where=f"scene: {body.name}")
-    settings = task.collisions
-    yield from _figure("collisions", settings.clearance, where="collisions.clearance")
-    for link, padding in settings.padding.items():
-        yield from _figure("collisions", padding, where=f"collisions.padding.{link}")
-
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
-    """Check the joint positions and tool angles that a task states, in postures and along the path."""
+    """Check the joint positions and tool angles that a task states, in postures and along its paths."""
+    return tuple(issue for part in problem.parts for issue in _places_of_part(part))
+
+
+def _places_of_part(problem: Problem) -> list[Issue]:
+    """Check the joint positions and tool angles of a part, or of a task without parts."""
     task_map = problem.task_map
     along = problem.path.sample(np.linspace(0.0, 1.0, 401)).target
     issues: list[Issue] = []
@@ -158,8 +59,8 @@ def of_places(problem: Problem) -> tuple[Issue, ...]:
         path_start = problem.task.path_start
         begins = abs(path_start[-1]) if isinstance(path_start, tuple) else 0.0
         turn = float(np.ptp(along[:, -1]))
-        issues += [*_figure("path_start", begins), *_figure("path", turn)]
-    return tuple(issues)
+        issues += [*check_figure("path_start", begins), *check_figure("path", turn)]
+    return issues
 
 
 def of_postures(robot: Robot, key: str, postures: np.ndarray) -> Iterator[Issue]:
@@ -188,71 +89,6 @@ def of_end_time(t_end: float, least: float) -> tuple[Issue, ...]:
     )
     usual = "more; check the units of limits, lengths and masses"
     return (Issue("t_end", message, f"{t_end:.6g} s", usual),)
-
-
-def _tool(task: Task) -> Iterator[Issue]:
-    """Check the highest tool limit of each kind, and dwells; feed rates are left out, as they have their own units."""
-    limits = task.tool_limits
-    speed = limits.speed
-    values = {
-        "speed": speed.speed if isinstance(speed, SpeedTable) else [speed],
-        "process_speed": [section.speed for section in limits.process_speed],
-        "acceleration": [limits.acceleration],
-        "angular_speed": [limits.angular_speed],
-    }
-    for key, figures in values.items():
-        yield from _figure(f"tool_limits.{key}", _largest(figures))
-    meant = "degrees per second" if task.task_space == "joints" else "mm/s"
-    message = f"the speed looks like {meant}"
-    for name, speed in zip(("start", "end"), task.boundary.given_speeds, strict=True):
-        key = f"{name}_speed"
-        value = _largest([speed])
-        yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
-
-    for i, segment in enumerate(task.path):
-        yield from _figure("path.dwell", segment.dwell, where=f"path[{i}].dwell")
-
-
-def _largest(values: Iterable[float | None]) -> float:
-    """Return the largest value below 1e5; larger values stand for "no limit"."""
-    return max(
-        (value for value in values if value is not None and value < 1e5), default=0.0
-    )
-
-
-def _angles(task: Task) -> Iterator[Issue]:
-    """Find angles that are in rad but should be in degrees: multiples of an eighth of a turn, up to two turns.
-
-    An angle has to agree with such a multiple to two decimals: 3.14 is half a turn, but 5.5 is not seven eighths of a
-    turn.
-    """
-    content = task.model_dump(
-        include={
-            "path_start": True,
-            "path": True,
-            "frames": True,
-            "scene": True,
-            "robot": {"mounting", "tool_offset"},
-        },
-        exclude={"path": {"__all__": {"bspline", "spline"}}},
-    )
-    for key, degrees in _in_degrees("", content):
-        eighths = round(degrees / (0.125 * TURN))
-        if 1 <= abs(eighths) <= 16 and abs(degrees - 0.125 * TURN * eighths) < 2e-3:
-            usual = f"{math.degrees(degrees):.4g} deg for that angle"
-            yield Issue(key, "the angle looks like rad", f"{degrees:.6g} deg", usual)
-
-
-def _in_degrees(key: str, content: object) -> Iterator[tuple[str, float]]:
-    """Yield all numbers under keys that end in ``_deg``, with their dotted keys."""
-    if isinstance(content, Mapping):
-        for name, value in content.items():
-            yield from _in_degrees(f"{key}.{name}" if key else name, value)
-    elif isinstance(content, list | tuple):
-        for number, value in enumerate(content):
-            yield from _in_degrees(f"{key}[{number}]", value)
-    elif isinstance(content, float) and re.search(r"_deg(\[\d\])?$", key):
-        yield key, content
 
 
 def of_robot(robot: Robot) -> tuple[Issue, ...]:
@@ -302,10 +138,10 @@ def _lengths(robot: Robot) -> Iterator[Issue]:
     offset = math.hypot(*settings.tool_offset.xyz)
     names = (*robot.joint_names[1:], robot.tool_frame)
     for name, length in zip(names, (*links, last - offset), strict=True):
-        yield from _figure("link", length, where=f"URDF origin of {name}")
-    yield from _figure("robot.tool_offset.xyz", offset, max(1.0, sum(links)))
-    yield from _figure("robot.mounting.xyz", math.hypot(*settings.mounting.xyz))
-    yield from _figure("robot.gravity", math.hypot(*settings.gravity))
+        yield from check_figure("link", length, where=f"URDF origin of {name}")
+    yield from check_figure("robot.tool_offset.xyz", offset, max(1.0, sum(links)))
+    yield from check_figure("robot.mounting.xyz", math.hypot(*settings.mounting.xyz))
+    yield from check_figure("robot.gravity", math.hypot(*settings.gravity))
 
 
 def _payload(robot: Robot, bare: Robot) -> Iterator[Issue]:
@@ -319,9 +155,9 @@ def _payload(robot: Robot, bare: Robot) -> Iterator[Issue]:
     heaviest = (3.0 * moved or math.inf) / USUAL["robot.payload.mass"][1]
     inertia = payload.inertia
     moment = max(inertia.ixx, inertia.iyy, inertia.izz) if inertia else 0.0
-    yield from _figure("robot.payload.mass", payload.mass, min(size**2, heaviest))
-    yield from _figure("robot.payload.com", math.hypot(*payload.com), size)
-    yield from _figure("robot.payload.inertia", moment, payload.mass * size**2)
+    yield from check_figure("robot.payload.mass", payload.mass, min(size**2, heaviest))
+    yield from check_figure("robot.payload.com", math.hypot(*payload.com), size)
+    yield from check_figure("robot.payload.inertia", moment, payload.mass * size**2)
 
 
 def _masses(robot: Robot) -> Iterator[Issue]:
@@ -329,13 +165,15 @@ def _masses(robot: Robot) -> Iterator[Issue]:
     for body in robot.urdf_dynamics.bodies:
         where = f"URDF inertials that joint {body.joint} moves"
         moment = float(np.linalg.eigvalsh(body.inertia)[-1])
-        yield from _figure("body mass", body.mass, size**2, where)
-        yield from _figure("body inertia", moment, body.mass, where)
+        yield from check_figure("body mass", body.mass, size**2, where)
+        yield from check_figure("body inertia", moment, body.mass, where)
     links = read_tree(robot.urdf, robot.source).links
     for name, (joint, _) in robot.urdf_dynamics.links.items():
         if joint and robot.has_masses and not mass_of(links[name]):
             moment = float(inertia_matrix(links[name]).max())
-            yield from _figure("massless inertia", moment, where=f"URDF link {name}")
+            yield from check_figure(
+                "massless inertia", moment, where=f"URDF link {name}"
+            )
 
 
 def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
@@ -349,15 +187,21 @@ def say_how_far(task_map: TaskMap, path: Path, s: float) -> str:
 
 
 def check_within_reach(problem: Problem) -> None:
-    """Refuse a tool path that is farther away than the arm's links and slides together can reach.
+    """Refuse tool paths that are farther away than the arm's links and slides together can reach.
 
     Raises
     ------
     PathError
     """
+    for number, part in enumerate(problem.parts):
+        _check_path_within_reach(part, problem.key_of(number))
+
+
+def _check_path_within_reach(problem: Problem, key: str) -> None:
+    """Refuse the path of a part, which has a key in messages."""
     task_map = problem.task_map
     path = problem.path
-    if not task_map.axes:  # a prescribed joint path
+    if not task_map.axes:  # a prescribed joint path, or a move
         return
     s = np.linspace(0.0, 1.0, 401)
     robot = task_map.robot
@@ -372,6 +216,7 @@ def check_within_reach(problem: Problem) -> None:
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
+        where=f"{key}, s in [{beyond[0]:.4g}, {beyond[-1]:.4g}]",
         found=f"{distance} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
         allowed=f"at most {largest} m, the length of all links and slides in one line",
         hint=distance_hint(furthest, far)

@@ -64,9 +64,9 @@ def bind_task(
     boundary = task.boundary.model_copy(
         update={"start_speed": closing, "end_speed": closing}
     )
-    whole_task = task.model_copy(update={"scene": lasting, "boundary": boundary})
-    whole = Problem.of(robot, whole_task, own_limits)
-    whole = replace(whole, task=task.model_copy(update={"boundary": boundary}))
+    bounded = task.model_copy(update={"boundary": boundary})
+    whole = Problem.of(robot, bounded.with_scene(lasting), own_limits)
+    whole = replace(whole, task=bounded)
     ends = [stretch.end for stretch in stretches]
     if ends[-1] == "free":
         ends[-1] = task.start if task.end == "start" else task.end
@@ -119,8 +119,10 @@ class _Stretch:
 
     @property
     def key(self) -> str:
-        """Key of the first part, for messages."""
-        return f"program[{self.parts[0][0]}]"
+        """Key of the path or the move, for messages; of the first part if there is none."""
+        limited = [entry for entry in self.parts if isinstance(entry[1], LimitedPart)]
+        number, _ = (*limited, *self.parts)[0]
+        return f"program[{number}]"
 
     @property
     def end(self) -> Posture | str:
@@ -198,7 +200,7 @@ def _stretches(task: Task) -> Iterator[_Stretch]:
 def _free_stretches(task: Task) -> Iterator[_Stretch]:
     """Yield every path of a program whose order is free, with a move before, between and after them as needed."""
     payload = task.robot.payload
-    move = (0, MovePart(move=NEXT, name="move"))
+    move = (0, MovePart(move=NEXT, name="to the end"))
     for number, part in enumerate(task.program):
         if number or task.start != "free":
             yield _Stretch(payload, task.scene, [move])
@@ -233,14 +235,12 @@ def _task_of(
             where=stretch.key,
             allowed="a path in place of the approach or retract",
         )
+    task = task.with_scene(stretch.scene)
     limited = stretch.of(LimitedPart)[0]
     changes: dict[str, Any] = {
         "program": (),
         "order": "given",
         "robot": robot.settings,
-        "scene": stretch.scene,
-        # A scene may be empty during a part: the mode is that of the whole program.
-        "collisions": task.collisions.model_copy(update={"mode": task.collision_mode}),
         **stated,
         "tool_limits": limited.tool_limits or task.tool_limits,
     }

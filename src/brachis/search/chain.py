@@ -15,12 +15,13 @@ import numpy as np
 from brachis import ik
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
-from brachis.errors import PathError, TaskError
+from brachis.errors import BrachisError, PathError, TaskError
 from brachis.optimise.backends import solvers_for
 from brachis.problem.chain import ProblemChain
 from brachis.problem.problem import Decomposition, Decompositions, Problem
+from brachis.search.failure import explain_no_motion, explain_reach
 from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_charts
-from brachis.search.joint_path import DeadEnd
+from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.lattice import step_lengths
 from brachis.search.moves import move_guesses
 from brachis.search.order import find_orders
@@ -340,7 +341,11 @@ class _ChainSearch:
         changed = replace(
             part, beside=beside, start=part.start if start is None else start
         )
-        guesses = self._guesses(changed, name)
+        try:
+            guesses = self._guesses(changed)
+        except BrachisError as error:
+            error.where = ": ".join(filter(None, (f"program: {name}", error.where)))
+            raise
         return [
             _Option(
                 guess.postures_at(np.array([0.0, 1.0]))[:, : self.problem.robot.n],
@@ -350,25 +355,27 @@ class _ChainSearch:
             for guess in guesses
         ]
 
-    def _guesses(self, part: Problem, name: str) -> list[InitialGuess]:
+    def _guesses(self, part: Problem) -> list[InitialGuess]:
         """Find joint paths of a path."""
         own = Decompositions(part, self.families)
-        dead_ends: list[DeadEnd] = []
+        dead_ends: dict[str, DeadEnd] = {}
         if has_charts(part, own):
             found = joint_paths_in_charts(part, own, self.level, self.deadline)
             if not isinstance(found, DeadEnd):
                 return found
-            dead_ends.append(found)
+            dead_ends[ALL_POSTURES] = found
+        reason = None
         for batch in batches(part, own, self.deadline, self.listener):
             if batch.guesses:
                 return list(batch.guesses)
-            dead_ends += [dead_end for _, dead_end in batch.lattices]
-        why = f": {dead_ends[0]}" if dead_ends else ""
-        raise PathError(
-            f"no joint path of {name} was found{why}",
-            s_interval=dead_ends[0].interval if dead_ends else None,
-            where="program",
-        )
+            for decomposition, dead_end in batch.lattices:
+                name = ALL_POSTURES if decomposition is None else decomposition.name
+                dead_ends[name] = dead_end
+            if batch.fallback and dead_ends and own and reason is None:
+                reason = explain_reach(own[0], self.deadline)
+                if isinstance(reason, PathError):
+                    raise reason
+        raise explain_no_motion(part, own, (), dead_ends, self.deadline)
 
     def guess_of(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
         """Return the guess of a chain; raise PathError if no move gets round what is in its way."""

@@ -260,11 +260,16 @@ def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     facts = detail["ctx"]
     content = detail["input"]
     known = re.findall(r"\w+", facts["allowed"])
-    hint = None
-    if isinstance(content, Mapping) and not any(key in content for key in known):
-        hints = (_KEYS_OF_OTHERS.get(name) or suggest(name, known) for name in content)
-        hint = next(filter(None, hints), None)
-    return facts["problem"], show(content), facts["allowed"], hint
+    unknown = (
+        [name for name in content if name not in known]
+        if isinstance(content, Mapping)
+        else []
+    )
+    for name in unknown:
+        hint = _KEYS_OF_OTHERS.get(name) or suggest(name, known)
+        if hint:
+            return facts["problem"], f"the unknown key {name}", facts["allowed"], hint
+    return facts["problem"], show(content), facts["allowed"]
 
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:

@@ -6,7 +6,7 @@ alike, and reports a mistake as a `brachis.errors.TaskError` that names the key.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import Annotated, Any, Literal
 
@@ -44,9 +44,11 @@ from brachis.task.point_data import FitReport
 from brachis.task.points.units import choices
 from brachis.task.program import (
     NEXT,
+    WAYS,
     ProgramPart,
     find_mistakes,
     part_names,
+    scene_during,
     with_task_space,
 )
 from brachis.task.scene import CollisionSettings, SceneBody, SceneSource, name_bodies
@@ -283,6 +285,17 @@ class Task(CheckedModel):
                     allowed=", ".join(names)
                     or "null: only a program in a given order has times",
                 )
+        moving = [i for i, part in enumerate(self.program) if part.kind in WAYS]
+        for i, body in enumerate(self.scene):
+            if names and not any(
+                scene_during([body], self.program, number) for number in moving
+            ):
+                raise refuse(
+                    "the arm does not move while the body is there",
+                    key=f"scene[{i}].since",
+                    found=body.since,
+                    allowed="a body that is there during a path or a move",
+                )
 
     def _mistakes_at_the_start(self) -> Iterator[Mistake]:
         first = self.path[0]
@@ -406,6 +419,16 @@ class Task(CheckedModel):
         if self.collisions.mode != "auto":
             return self.collisions.mode
         return "avoid" if self.scene else "off"
+
+    def with_scene(self, bodies: Sequence[SceneBody]) -> Task:
+        """Return the task with some of its bodies, which are always there, and its treatment of collisions."""
+        always = {"since": None, "until": None}
+        scene = tuple(body.model_copy(update=always) for body in bodies)
+        absent = {body.name for body in self.scene} - {body.name for body in scene}
+        disable = [pair for pair in self.collisions.disable if absent.isdisjoint(pair)]
+        changes = {"mode": self.collision_mode, "disable": tuple(disable)}
+        collisions = self.collisions.model_copy(update=changes)
+        return self.model_copy(update={"scene": scene, "collisions": collisions})
 
     @property
     def of_poses(self) -> bool:

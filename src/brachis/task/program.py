@@ -35,7 +35,7 @@ from brachis.task.scene import SceneBody
 from brachis.task.settings import Payload
 from brachis.task.tolerances import TaskSpace, Tolerances
 
-_WAYS = ("path", "move", "approach", "retract")
+WAYS = ("path", "move", "approach", "retract")
 """Kinds of parts in which the arm moves."""
 NEXT = "next"
 """Word for the posture in which the next part begins best."""
@@ -220,8 +220,7 @@ def scene_during(
         end = len(names) if body.until is None else names.index(body.until)
         return begin <= number < end
 
-    always = {"since": None, "until": None}
-    return tuple(body.model_copy(update=always) for body in scene if is_there(body))
+    return tuple(filter(is_there, scene))
 
 
 def path_keys(part: PathPart) -> dict[str, Any]:
@@ -277,7 +276,7 @@ def find_mistakes(
         return
     yield from _find_wrong_order(parts)
     yield from _find_wrong_flights(parts, is_closed=end == "start")
-    ways = [part for part in parts if part.kind in _WAYS]
+    ways = [part for part in parts if part.kind in WAYS]
     if ways and isinstance(ways[-1], MovePart):
         yield from _find_wrong_end(ways, start, end, postures)
 
@@ -330,8 +329,8 @@ def _find_wrong_end(
 
 def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
     """Yield the mistakes in the order of parts."""
-    kinds = [part.kind for part in parts if part.kind in _WAYS]
-    numbers = [i for i, part in enumerate(parts) if part.kind in _WAYS]
+    kinds = [part.kind for part in parts if part.kind in WAYS]
+    numbers = [i for i, part in enumerate(parts) if part.kind in WAYS]
     for number, before, kind, after in zip(
         numbers, [None, *kinds], kinds, [*kinds[1:], None], strict=False
     ):
@@ -376,7 +375,7 @@ def _find_wrong_flights(parts: Sequence[Part], *, is_closed: bool) -> Iterator[M
     followers = [*parts[1:], parts[0] if is_closed and len(parts) > 1 else None]
     for number, (part, after) in enumerate(zip(parts, followers, strict=False)):
         kinds = [part.kind, getattr(after, "kind", "dwell")]
-        if part.flies and not ("move" in kinds and set(kinds) <= set(_WAYS)):
+        if part.flies and not ("move" in kinds and set(kinds) <= set(WAYS)):
             yield (
                 f"program[{number}].fly",
                 "the arm cannot pass on without a stop here",

@@ -219,8 +219,8 @@ class RobotSettings(Model):
     base_frame: Name | None = None
     """First frame of the chain. Null: the root of the URDF."""
     workpiece_frame: Name | None = None
-    """Link that carries the workpiece, such as a positioner's table, in whose frame paths are given. Null: the world
-    frame."""
+    """Link that carries the workpiece, such as a positioner's table, in whose frame paths and their frames are given,
+    but not bodies. Null: the world frame."""
     mounting: Mounting = Field(default_factory=Placement)
     """Placement of the root link of the URDF in the world: floor, wall (z along the world's x axis), ceiling (upside
     down, turned about x), or {xyz: ..., rpy_deg: ...}."""
@@ -373,7 +373,7 @@ def expand_solver_name(solver: object) -> object:
     return {"name": solver} if isinstance(solver, str) else solver
 
 
-FREE: Final[Literal["free"]] = "free"
+FREE: Final = "free"
 """Word for a speed that the planner chooses."""
 EndSpeed = Annotated[
     Literal["free"] | Annotated[NonNegative, Field(le=1e6)],

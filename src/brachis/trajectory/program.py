@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from brachis.robot import Robot, dynamics
+from brachis.robot.plausibility import Issue
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,17 @@ class Event:
     def __str__(self) -> str:
         """Return the name and the time."""
         return f"{self.name} at {self.time:.4f} s"
+
+
+def check_times(events: Sequence[Event], t_end: float) -> tuple[Issue, ...]:
+    """Find events before or after a motion that takes `t_end`, s: their leads are longer than what is around them."""
+    message = "the event is not during the motion"
+    usual = f"0 to {t_end:.4f} s; change its lead"
+    return tuple(
+        Issue(f"events.{event.name}", message, f"{event.time:.4f} s", usual)
+        for event in events
+        if not 0.0 <= round(event.time, 9) <= round(t_end, 9)
+    )
 
 
 PART_COLUMNS = ("part", "kind", "time", "share")

@@ -100,7 +100,7 @@ class Gradient:
         What is changed: the name of a frame, ``path`` for paths in the world, ``base``, ``payload``, or ``tool``.
     figure : str
         ``x``, ``y`` and ``z`` along the axes of the world; ``roll``, ``pitch`` and ``yaw`` about them, through the
-        origin of the frame, of the base, or the beginning of the path; ``mass``; or a process speed.
+        beginning of the path that moves (of several: their mean), or else the origin; ``mass``; or a process speed.
     unit : str
         ``m``, ``rad``, ``kg`` or ``m/s``.
     derivative : float or None

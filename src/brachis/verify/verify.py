@@ -151,11 +151,13 @@ def _verify_program(
     """
     trajectory = motion.trajectory
     worst: dict[str, Check] = {}
-    verified = []
+    verified: list[Verification] = []
     for begin, component in trajectory.components:
         robot = _robot_of(component, motion)
+        # The first component warns of limits that are not checked.
+        checked = replace(component, own_limits=()) if verified else component
         part = verify_trajectory(
-            component, motion.options, robot=robot, own_limits=own_limits
+            checked, motion.options, robot=robot, own_limits=own_limits
         )
         verified.append(part)
         for check in part.checks:

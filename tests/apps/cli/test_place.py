@@ -37,3 +37,16 @@ def test_gradients_alone(run, write):
     }
     assert by_figure["path", "x"] == pytest.approx(-by_figure["base", "x"], rel=1e-6)
     assert by_figure["payload", "mass"] > 0.0
+
+
+def test_gradients_are_printed_with_the_end_time(run, write):
+    text = run(f"place {write(TASK)} --gradients").out
+    assert re.search(r"end time t_E: \d\.\d+ s", text)
+
+
+def test_gradients_alone_refuse_a_file_for_another_task(run, write, tmp_path):
+    file = tmp_path / "moved.yaml"
+    for option in (f"--out {file}", "--range x=-0.2,0.2"):
+        message = run(f"place {write(TASK)} --gradients {option}", code=2).err
+        assert "cannot be used with --gradients" in message
+    assert not file.exists()

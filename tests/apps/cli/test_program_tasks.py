@@ -87,3 +87,34 @@ def test_costs_by_solving_again_need_the_task(error_of, saved):
     assert "check: the motion of a program cannot" in error_of(
         f"bottleneck {saved} --check"
     )
+
+
+def test_inspect_warns_of_figures_of_parts_in_other_units(error_of, write):
+    path = {
+        "path": [{"line": {"by": [0.1, 0.0, 0.0]}, "stop": True, "dwell": 400}],
+        "path_start": {"position": [0.5, 0, 0.4], "rpy_deg": [3.1416, 0, 0]},
+        "tool_limits": {"speed": 80},
+    }
+    task = {
+        "brachis": 1,
+        "robot": {"urdf": "iiwa14"},
+        "start": {"joints": [0, 0.5, 0, -1.2, 0, 1.0, 0.3]},
+        "task_space": "pose",
+        "program": [
+            {"move": "next"},
+            {"approach": 50},
+            path,
+            {"dwell": 500},
+            {"retract": 40},
+        ],
+    }
+    message = " ".join(error_of(f"inspect {write(task)}").split())
+    for where, hint in (
+        ("program[1].approach", "50 mm are 0.05 m"),
+        ("program[2].path[0].dwell", "looks like ms"),
+        ("program[2].path_start.rpy_deg[0]", "looks like rad"),
+        ("program[2].tool_limits.speed", "looks like mm/s"),
+        ("program[3].dwell", "looks like ms"),
+        ("program[4].retract", "40 mm are 0.04 m"),
+    ):
+        assert hint in message.partition(where)[2].partition("program[")[0]

@@ -11,6 +11,8 @@ from brachis.apps.controller.run import slow_down
 from brachis.apps.export import write_for_controller
 from brachis.errors import InputError
 from brachis.trajectory import Event
+from support.effort import QUICK
+from support.slides import X, slides
 
 
 def test_the_run_is_checked_against_the_limits_of_each_part(cycle):
@@ -47,6 +49,23 @@ def test_a_run_is_on_the_path_of_each_part(cycle):
     (failure,) = run.failures
     assert "path error" in failure
     assert "bead" in failure
+
+
+def test_samples_around_a_change_of_the_payload_are_not_mixed():
+    """The light part begins faster than the heavy part before it could move."""
+    parts = [
+        {"move": {"joints": [0.5]}},
+        {"payload": None},
+        {"move": {"joints": [0.0]}},
+    ]
+    slide = slides([X], [16.0], 2.0, gravity=[0, 0, 0])
+    loaded = {"payload": {"mass": 5.0}, "limits": {"scale": {"torque": 0.9}}}
+    result = brachis.plan(
+        slide, program=parts, start=[0.0], robot=loaded, rest="velocity", **QUICK
+    )
+    checks = brachis.verify_run(result, "kuka_rsi_4ms").checks
+    (torque,) = (check for check in checks if check.name == "torque ratio")
+    assert torque.value == pytest.approx(0.9, rel=0.01)
 
 
 def test_a_slower_program_is_slower_in_all_parts(cycle):

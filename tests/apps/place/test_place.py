@@ -1,5 +1,7 @@
 """Moving a workpiece or the base: what is found, what is written, what is refused."""
 
+from dataclasses import replace
+
 import pytest
 
 import brachis
@@ -55,6 +57,35 @@ def test_the_path_turns_about_its_beginning(placing):
     first = tool_at_start(placing.after)
     assert first[0] == pytest.approx(1.5 + placing.change["x"], abs=1e-6)
     assert first[1] == pytest.approx(-0.3, abs=1e-6)
+
+
+def test_the_added_frame_has_a_name_that_no_frame_of_the_user_has():
+    task = {**TASK, "frames": {"workpiece": {"xyz": [1.0, 0.0, 0.0]}}}
+    ranges = {"x": (-0.4, 0.0)}
+    placing = brachis.place(task, ranges=ranges, starts=1, steps=1)
+    assert placing.moved == placing.task.path_frame == "workpiece_2"
+    assert placing.task.frames["workpiece"].xyz == (1.0, 0.0, 0.0)
+    assert placing.change["x"] < 0.0
+
+
+def test_an_unverified_first_plan_is_not_the_fastest(monkeypatch):
+    """The first plan is faster than all others, and may not be run."""
+
+    def plan_too_fast(*args, **keywords):
+        result = brachis.plan(*args, **keywords)
+        report = result.verification
+        failed = replace(report.checks[0], value=2.0, limit=1.0)
+        checks = (failed, *report.checks[1:])
+        return replace(result, verification=replace(report, checks=checks))
+
+    monkeypatch.setattr("brachis.apps.place.move.plan", plan_too_fast)
+    ranges = {"x": (0.0, 0.05)}
+    placing = brachis.place(TASK, ranges=ranges, starts=2, steps=0)
+    assert not placing.before.verified
+    assert placing.after.verified
+    assert placing.after.t_end > placing.before.t_end
+    assert placing.trials[0].t_end == float("inf")
+    assert "not verified" in placing.summary()["end time before"]
 
 
 def test_the_base_moves_while_the_path_stays():

@@ -5,9 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import brachis
 from brachis.apps.view import Viewer
 from brachis.apps.view.bodies import prescribed_path
 from brachis.apps.view.tables import state_table
+from support.cycle import CYCLE
 
 pytest.importorskip("viser", reason="viser is not installed")
 
@@ -48,6 +50,29 @@ def test_a_choice_shows_its_instant_and_pauses(shown, cycle, number):
     assert not shown.playback.playing
     now = motion.at(np.array([times[number]]))
     assert shown._state.content == state_table(motion, now)
+
+
+def test_bodies_appear_and_disappear_with_the_parts():
+    bodies = [
+        {"name": "lasting", "sphere": 0.02, "position": [3, 0, 0]},
+        {"name": "early", "sphere": 0.02, "position": [3, 1, 0], "until": "bead"},
+        {"name": "late", "sphere": 0.02, "position": [3, 2, 0], "since": "payload 4"},
+    ]
+    collisions = {"mode": "check", "capsules": "auto"}
+    result = brachis.plan({**CYCLE, "scene": bodies, "collisions": collisions})
+    motion = result.trajectory
+    _, bead, dwell, _ = motion.parts
+    with Viewer(motion, verified=True, port=0) as viewer:
+        handles = [handle for _, handle in viewer._scene._passing]
+        for t, shown in (
+            (0.0, [True, False]),
+            (bead.begin, [False, False]),
+            (dwell.end - 1e-6, [False, False]),
+            (dwell.end, [False, True]),
+            (motion.t_end, [False, True]),
+        ):
+            viewer._scene.show(t)
+            assert [handle.visible for handle in handles] == shown
 
 
 def test_a_motion_without_parts_has_no_list(line_trajectory):

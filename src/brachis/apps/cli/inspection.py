@@ -158,8 +158,9 @@ def _problem_of(
     is_needed: bool,
 ) -> Problem | None:
     """Return the problem of a task, or None if it cannot be planned; `remarks` and `collisions` get the reasons."""
-    from brachis.problem.plausibility import check_within_reach, of_robot, of_task
+    from brachis.problem.plausibility import check_within_reach, of_robot
     from brachis.problem.program import bind_task
+    from brachis.problem.task_plausibility import of_task
     from brachis.robot.plausibility import report_issues
     from brachis.scene import MANY_POSTURES
 
@@ -171,8 +172,7 @@ def _problem_of(
             for pair in collisions["never_free"]
         ]
         problem = bind_task(robot, task)
-        for part in problem.parts:
-            check_within_reach(part)
+        check_within_reach(problem)
     except InputError as error:
         report_issues(of_robot(robot) + of_task(task), strict=task.strict)
         if is_needed and not collisions["never_free"]:
@@ -218,7 +218,8 @@ def _describe(
 
 def _warnings(robot: Robot, problem: Problem | None) -> list[str]:
     """List implausible values, or raise PlausibilityError where planning the task would raise it."""
-    from brachis.problem.plausibility import of_places, of_robot, of_task
+    from brachis.problem.plausibility import of_places, of_robot
+    from brachis.problem.task_plausibility import of_task
     from brachis.robot.plausibility import refuse_issues
 
     issues = of_robot(robot)

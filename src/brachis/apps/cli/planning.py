@@ -303,20 +303,27 @@ def place(
     brachis place cell.yaml --range x=-0.2,0.2 --range yaw_deg=-30,30 --out moved.yaml
     brachis place cell.yaml --move base --range z=0,0.4
     """
-    from brachis.apps.place import read_range, write_task
+    from brachis.apps.place import read_range, write_end_time, write_task
 
     check_new(out)
+    if gradients:
+        options = {"--out": out, "--range": ranges}
+        refuse_options(options, "--gradients", "a search for a faster place")
     limits = dict(read_range(text) for text in ranges or ())
     with end_cleanly(), show_progress() as listener:
         if gradients:
-            before, _ = _plan_task(task, None, changes, None, listener)
-            after = before
-            data: dict[str, Any] = {"t_end": before.t_end}
+            after, _ = _plan_task(task, None, changes, None, listener)
+            data: dict[str, Any] = {"t_end": after.t_end, "verified": after.verified}
         else:
             loaded = load_changed_task(task, read_changes(changes))
-            options: dict[str, Any] = {"starts": starts, "steps": steps, "jobs": jobs}
             placing = brachis.place(
-                loaded, move=move, ranges=limits, listener=listener, **options
+                loaded,
+                move=move,
+                ranges=limits,
+                starts=starts,
+                steps=steps,
+                jobs=jobs,
+                listener=listener,
             )
             after = placing.after
             data = placing.to_dict()
@@ -327,7 +334,9 @@ def place(
     if json:
         print_json(data)
     else:
-        if not gradients:
+        if gradients:
+            print_lines(f"end time t_E: {write_end_time(after)}")
+        else:
             print_table("placement", ("", ""), placing.summary().items())
         rows = [entry.row for entry in entries]
         print_table("gradients", ("what", "change", "derivative of t_E"), rows)

@@ -43,8 +43,6 @@ _STILL = 1e-9
 """A joint that moves by less than this counts as standing still, rad or m."""
 _REST = 1e-6
 """Maximum acceleration that counts as rest, as a fraction of the largest acceleration of the motion."""
-_FEWEST_NODES = 2
-"""Number of samples in a part of a program from which on there is a motion to check."""
 _DIVISORS = (2, 4, 8)
 """Divisors of the period to try when a run fails: three halvings of 10 ms, as for ROS 2, stay above 1 ms."""
 
@@ -243,16 +241,18 @@ class _Run:
         for begin, component in run.components:
             local = run.times - begin
             (rows,) = np.nonzero((local >= 0.0) & (local <= component.t_end))
-            if len(rows) < _FEWEST_NODES:
+            if len(rows) <= 1:  # there is no motion to check
                 continue
-            first = local[rows[0]]
             t = local[rows]
             plan = component.at(t)
-            times = t - first
+            times = t - t[0]
             nodes: dict[str, Any] = {}
             for name in ("q", "qdot", "qddot", "qddot_before"):
                 virtual = getattr(plan, name.removesuffix("_before"))
                 joints = getattr(run, name)[rows]
+                if self.profile.is_sampled and name != "q":
+                    # Differences at an end would be those of two parts.
+                    joints[[0, -1]] = virtual[[0, -1], : joints.shape[1]]
                 nodes[name] = np.hstack([joints, virtual[:, joints.shape[1] :]])
             inner = replace(
                 component,
@@ -263,7 +263,7 @@ class _Run:
                 phase_ends=times[-1:],
                 **nodes,
             )
-            yield begin + first, inner
+            yield begin + t[0], inner
 
     def _with_path(self, run: Trajectory) -> CheckedMotion:
         """Return a run with its path, for the checks."""

@@ -16,7 +16,6 @@ from brachis.apps.place.search import WORKPIECE, PlaceSearch
 from brachis.common.arguments import count
 from brachis.common.progress import Listener, report_progress
 from brachis.planner import plan, read_arguments
-from brachis.problem.program import bind_task
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.task import Source, TaskKeywords
@@ -90,10 +89,9 @@ def place(
     check_ranges(ranges)
     with report_progress(listener, progress) as report:
         robot, loaded = read_arguments(robot_or_task, task, keywords)
-        problem = bind_task(robot, loaded)
-        search = PlaceSearch.of(problem, loaded, move, ranges, report)
+        search = PlaceSearch.of(robot, loaded, move, ranges, report)
         report("planning the task as it is")
-        before = plan(robot, loaded, listener=listener, progress=False)
+        before = plan(robot, search.task, listener=listener, progress=False)
         start_places = []
         if count(starts, "starts") > 1:
             from scipy.stats import qmc
@@ -102,11 +100,13 @@ def place(
             start_places = list(sampler.random(starts - 1))
         candidates = search.plan_starts(robot, start_places, before, jobs)
         candidates = sorted(candidates, key=lambda candidate: candidate[1].t_end)
-        best = (search.present, before)
-        for candidate in candidates[:_DESCENTS]:
-            found = search.descend(robot, *candidate, steps)
-            best = min(best, found, key=lambda pair: pair[1].t_end)
-        place_found, after = best
+        reached = [
+            search.descend(robot, *candidate, steps)
+            for candidate in candidates[:_DESCENTS]
+        ]
+        place_found, after = min(
+            reached, key=lambda pair: pair[1].t_end, default=(search.present, before)
+        )
         if after is not before:
             report("planning the task at the best place")
             after = _faster(after, search.plan_at(robot, place_found, is_final=True))

@@ -85,8 +85,8 @@ class Placing(Summary):
         return {
             "moved": self.moved,
             "by": write_change(self.change) or "nothing",
-            "end time before": f"{self.before.t_end:.4f} s",
-            "end time after": f"{self.after.t_end:.4f} s",
+            "end time before": write_end_time(self.before),
+            "end time after": write_end_time(self.after),
             "gain": f"{100.0 * self.gain:.1f} %",
             "places tried": len(self.trials),
         }
@@ -97,6 +97,7 @@ class Placing(Summary):
             "moved": self.moved,
             "change": self.change,
             "t_end_before": self.before.t_end,
+            "verified_before": self.before.verified,
             "t_end": self.after.t_end,
             "gain": self.gain,
             "verified": self.after.verified,
@@ -106,6 +107,11 @@ class Placing(Summary):
                 if np.isfinite(trial.t_end)
             ],
         }
+
+
+def write_end_time(result: Result) -> str:
+    """Write the end time of a plan, and whether its motion may not be run."""
+    return f"{result.t_end:.4f} s{'' if result.verified else ', not verified'}"
 
 
 def write_task(task: Task) -> str:

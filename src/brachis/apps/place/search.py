@@ -22,6 +22,7 @@ from brachis.explain.placement import (
 )
 from brachis.planner import plan, plan_many
 from brachis.problem.problem import Problem
+from brachis.problem.program import bind_task
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.from_task import with_settings
@@ -78,7 +79,7 @@ def _find_subject(problem: Problem, move: str) -> str:
     if move == WORKPIECE and move not in movable:
         frames = problem.task.frames
         outer = [
-            PATH if name == PATH else name
+            name
             for name in movable
             if name != BASE and (name == PATH or frames[name].frame is None)
         ]
@@ -112,10 +113,8 @@ class PlaceSearch:
     ----------
     task : Task
         The task, in which the paths are given in a frame if this frame is moved.
-    subject : str
-        What the gradients call the thing that is moved.
     moved : str
-        What the task calls it.
+        Name of the frame, or ``base``.
     pivot : (3,) ndarray
         Point about which it is turned, m.
     names : tuple of str
@@ -125,7 +124,6 @@ class PlaceSearch:
     """
 
     task: Task
-    subject: str
     moved: str
     pivot: np.ndarray
     names: tuple[str, ...]
@@ -137,21 +135,23 @@ class PlaceSearch:
     @classmethod
     def of(
         cls,
-        problem: Problem,
+        robot: Robot,
         task: Task,
         move: str,
         ranges: Mapping[str, tuple[float, float]],
         report: Listener,
     ) -> PlaceSearch:
         """Open the search."""
-        subject = _find_subject(problem, move)
-        moved = subject
-        if subject == PATH:
+        problem = bind_task(robot, task)
+        moved = _find_subject(problem, move)
+        pivot = pivot_of(problem, moved)
+        if moved == PATH:
             moved = WORKPIECE
+            while moved in task.frames:
+                moved += "_2"
             task = add_workpiece(task, moved)
         low, high = np.array(list(ranges.values()), dtype=float).T
-        pivot = pivot_of(problem, subject)
-        return cls(task, subject, moved, pivot, tuple(ranges), low, high, report, [])
+        return cls(task, moved, pivot, tuple(ranges), low, high, report, [])
 
     @property
     def present(self) -> np.ndarray:
@@ -180,19 +180,20 @@ class PlaceSearch:
         jobs: int,
     ) -> list[tuple[np.ndarray, Result]]:
         """Plan at the first places, and return those with a verified motion; the plan of the present place is known."""
-        self.trials.append(Trial(self.change_at(self.present), before.t_end))
-        found = [(self.present, before)]
         self.report(f"planning at {len(places)} other places")
         tasks = [self.task_at(u) for u in places]
         pairs = [
             (with_settings(robot, mounting=task.robot.mounting), task) for task in tasks
         ]
         outcomes = plan_many(pairs, jobs=jobs, progress=False, **_QUICK)
-        for u, outcome in zip(places, outcomes, strict=True):
+        results = []
+        for u, outcome in zip(
+            [self.present, *places], [before, *outcomes], strict=True
+        ):
             result = self._keep(u, outcome)
             if result is not None:
-                found.append((u, result))
-        return found
+                results.append((u, result))
+        return results
 
     def plan_at(
         self,
@@ -226,7 +227,7 @@ class PlaceSearch:
         self.trials.append(Trial(change, t_end))
         where = write_change(change) or "the present place"
         self.report(
-            f"{where}: {'no motion' if result is None else f't_E = {t_end:.4f} s'}"
+            f"{where}: {'no verified motion' if result is None else f't_E = {t_end:.4f} s'}"
         )
         return result
 
@@ -235,7 +236,7 @@ class PlaceSearch:
         known = {
             entry.figure: entry.derivative
             for entry in result.gradients
-            if entry.subject in (self.subject, self.moved)
+            if entry.subject == self.moved
         }
         derivatives = [
             RANGES[name][1] * (known.get(RANGES[name][0]) or 0.0) for name in self.names

@@ -17,7 +17,8 @@ from brachis.apps.bottleneck.saturation import (
 from brachis.apps.plots.panels import Panel, joint_rows_of, panels_of
 from brachis.errors import BrachisError
 from brachis.limits import Limit, describe_guarantees, limits_of
-from brachis.problem.plausibility import of_robot, of_task
+from brachis.problem.plausibility import of_robot
+from brachis.problem.task_plausibility import of_task
 from brachis.robot.plausibility import Issue
 from brachis.search.planned import PlannedMotion
 from brachis.search.stages import Candidate

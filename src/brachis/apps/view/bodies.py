@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections import defaultdict
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ from brachis.robot.chain import path_frame_in_world
 from brachis.robot.urdf_elements import Element, read_tree
 from brachis.scene import Solid, scene_of
 from brachis.scene.chain import Chain
+from brachis.task.scene import SceneBody
 from brachis.trajectory import Samples, Trajectory
 
 if TYPE_CHECKING:
@@ -217,6 +219,8 @@ class Bodies:
     ----------
     links : dict of int to list of Trimesh
         Visual shapes of the URDF and bodies of the scene; joint 0 is the frame of the paths.
+    passing : dict of str to dict of int to list of Trimesh
+        Bodies of the scene, by name, that are there only during some parts of a program.
     skeleton : dict of int to list of Trimesh
         Shapes for the joints and for the straight lines between them.
     unread : tuple of str
@@ -228,6 +232,7 @@ class Bodies:
     """
 
     links: Meshes
+    passing: dict[str | None, Meshes]
     skeleton: Meshes
     unread: tuple[str, ...]
     box: np.ndarray
@@ -252,8 +257,15 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         for mesh in meshes:
             mesh.apply_transform(frame.placement.homogeneous)
         links[int(frame.parentJoint)] += meshes
-    for joint, meshes in scene_meshes(trajectory).items():
-        links[joint] += [with_colour(mesh, _COLOURS["scene"]) for mesh in meshes]
+    lasting = []
+    passing = {}
+    for body in trajectory.task.scene:
+        if body.since == body.until:
+            lasting.append(body)
+        else:
+            passing[body.name] = scene_meshes(trajectory, [body])
+    for joint, meshes in scene_meshes(trajectory, lasting).items():
+        links[joint] += meshes
     q = trajectory.position(np.linspace(0.0, trajectory.t_end, 33))
     positions, quaternions = placements(robot, q)
     size = np.ptp(positions, axis=(0, 1)).max()
@@ -272,7 +284,7 @@ def bodies_of(trajectory: Trajectory) -> Bodies:
         np.array([points.min(axis=0), points.max(axis=0)])
         for points in map(np.concatenate, (still + moving, moving))
     )
-    return Bodies(links, skeleton, tuple(unread), box, moving_box)
+    return Bodies(links, passing, skeleton, tuple(unread), box, moving_box)
 
 
 def _skeleton(trajectory: Trajectory, radius: float) -> Meshes:
@@ -324,10 +336,9 @@ def prescribed_path(trajectory: Trajectory, samples: Samples) -> np.ndarray:
     return points
 
 
-def scene_meshes(trajectory: Trajectory) -> Meshes:
-    """Make meshes of the bodies in a task's scene, without those of the robot, in the frames of their joints, m."""
-    task = trajectory.task
-    scene = scene_of(trajectory.robot, task)
+def scene_meshes(trajectory: Trajectory, bodies: Sequence[SceneBody]) -> Meshes:
+    """Make meshes of bodies in a task's scene, without those of the robot, in the frames of their joints, m."""
+    scene = scene_of(trajectory.robot, trajectory.task.with_scene(bodies))
     meshes: Meshes = defaultdict(list)
     if scene is None:
         return meshes
@@ -336,7 +347,7 @@ def scene_meshes(trajectory: Trajectory) -> Meshes:
     ):
         mesh = _mesh_of(solid)
         mesh.apply_transform(scene.placements[number])
-        meshes[int(scene.joints[number])].append(mesh)
+        meshes[int(scene.joints[number])].append(with_colour(mesh, _COLOURS["scene"]))
     return meshes
 
 

@@ -69,8 +69,8 @@ class ViewerScene:
         self.layers["tool frame"].append(tool)
         self.layers["world frame"].append(self._frame("/world", 0.15))
         self._draw_ground()
-        parts = [part for part, _, _ in trajectory.split_times(np.zeros(1))]
-        self._cells = [scene_of(part.robot, part.task) for part in parts]
+        self._parts = [part for part, _, _ in trajectory.split_times(np.zeros(1))]
+        self._cells = [scene_of(part.robot, part.task) for part in self._parts]
         if any(cell is not None and len(cell.pairs) for cell in self._cells):
             line = (np.zeros((2, 3)), (200, 30, 30), 3.0)
             self._draw_line("closest pair", f"{_PATHS}/closest/line", *line)
@@ -94,7 +94,11 @@ class ViewerScene:
             handle.position = positions[0, k]
             handle.wxyz = quaternions[0, k]
         begins = [begin for begin, _ in self._trajectory.components[1:]]
-        cell = self._cells[int(np.searchsorted(begins, t, side="right"))]
+        number = int(np.searchsorted(begins, t, side="right"))
+        names = {body.name for body in self._parts[number].task.scene}
+        for name, handle in self._passing:
+            handle.visible = name in names
+        cell = self._cells[number]
         if cell is not None and len(cell.pairs):
             self._show_closest(cell, q)
 
@@ -123,6 +127,12 @@ class ViewerScene:
         """Attach the links and the skeleton to the frames of the joints, with one asset per joint and layer."""
         import trimesh
 
+        self._passing = []
+        for name, bodies in self.bodies.passing.items():
+            for joint, meshes in bodies.items():
+                asset = trimesh.Scene(meshes).export(file_type="glb")
+                handle = self._api.add_glb(f"/joint {joint}/scene/{name}", asset)
+                self._passing.append((name, handle))
         layers = {"robot": self.bodies.links, "skeleton": self.bodies.skeleton}
         for layer, bodies in layers.items():
             for joint, meshes in bodies.items():
