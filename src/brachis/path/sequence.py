@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -101,17 +101,30 @@ def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class CurveSpan:
-    """The part of a curve between sigma = `first` and `last`, with the index of its segment (None for a blend)."""
+    """The part of a curve from sigma = `first` to `last`, which is below `first` if the curve is travelled backwards.
+
+    `segments` has the index of its segment or, for a blend, of the two segments that the blend joins.
+    """
 
     curve: Curve
     first: float
     last: float
-    segment: int | None = None
+    segments: tuple[int, ...] = ()
 
     @property
     def length(self) -> float:
         """Range of sigma."""
-        return self.last - self.first
+        return abs(self.last - self.first)
+
+    @property
+    def direction(self) -> float:
+        """1.0, or -1.0 if the curve is travelled backwards."""
+        return -1.0 if self.last < self.first else 1.0
+
+    @property
+    def backwards(self) -> CurveSpan:
+        """The span, travelled the other way round."""
+        return replace(self, first=self.last, last=self.first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +145,9 @@ class Path:
     frame : PathFrame or None
         Frame in which the curves are given; None means the world.
     stops : ndarray
-        Values of s at which the tool stops; only there may the path have corners.
+        Values of s at which the tool stops, ascending; only there may the path have corners.
+    dwells : ndarray
+        Time for which the tool waits at each stop, s.
     """
 
     spans: tuple[CurveSpan, ...]
@@ -141,6 +156,7 @@ class Path:
     positions: int
     frame: PathFrame | None
     stops: Array
+    dwells: Array
 
     @classmethod
     def of(
@@ -148,18 +164,68 @@ class Path:
         spans: tuple[CurveSpan, ...],
         positions: int,
         frame: PathFrame | None,
-        stopping: Sequence[int] = (),
+        dwells: Mapping[int, float],
     ) -> Self:
         """Join spans whose first `positions` rows are those of the position.
 
-        The tool stops at the ends of the segments with the indices `stopping`.
+        The tool stops at the ends of some segments, given by their indices, for the times `dwells`, s.
         """
         ends = sum_up([span.length for span in spans])
         total = float(ends[-1])
         breaks = ends / total
-        last = {span.segment: end for span, end in zip(spans, breaks[1:], strict=True)}
-        stops = np.array([last[segment] for segment in stopping], dtype=float)
-        return cls(spans, breaks, total, positions, frame, stops)
+        last = {span.segments: end for span, end in zip(spans, breaks[1:], strict=True)}
+        stops = np.array([last[segment,] for segment in dwells], dtype=float)
+        waits = np.array([*dwells.values()], dtype=float)
+        return cls(spans, breaks, total, positions, frame, stops, waits)
+
+    def travelled(self, begin: float, *, is_reversed: bool) -> Self:
+        """Return the path as it is travelled from s = `begin` on, if it is closed, and backwards if it is reversed.
+
+        If the ends of a closed path meet in a corner, the tool stops there.
+
+        Raises
+        ------
+        PathError
+            The path is not closed, or the tool waits where it begins.
+        """
+        spans = self.spans
+        stops = self.stops
+        dwells = self.dwells
+        if begin:
+            ends = self.sample([0.0, 1.0])
+            gap = float(np.abs(ends.target[1] - ends.target[0]).max())
+            if gap > tolerances.COORDINATE:
+                raise PathError(
+                    "only a closed path can begin elsewhere",
+                    where="path_begin",
+                    found=f"ends {gap:.3g} m or rad apart",
+                    allowed="a path that ends where it begins, in all coordinates",
+                )
+            spans = self.between(begin, 1.0).spans + self.between(0.0, begin).spans
+            stops = (stops - begin) % 1.0
+            if not _is_smooth(ends):
+                stops = np.append(stops, 1.0 - begin)
+                dwells = np.append(dwells, 0.0)
+            is_inside = np.abs(stops - 0.5) < 0.5 - tolerances.PATH
+            if dwells[~is_inside].any():
+                raise PathError(
+                    "the path begins where the tool waits",
+                    where="path_begin",
+                    found=begin,
+                    allowed="a place without a dwell",
+                )
+            order = np.argsort(stops)
+            order = order[is_inside[order]]
+            stops = stops[order]
+            dwells = dwells[order]
+        if is_reversed:
+            spans = tuple(span.backwards for span in spans[::-1])
+            stops = 1.0 - stops[::-1]
+            dwells = dwells[::-1]
+        breaks = sum_up([span.length for span in spans]) / self.total
+        breaks[-1] = 1.0
+        stops = breaks[np.searchsorted(breaks, stops - tolerances.PATH)]
+        return replace(self, spans=spans, breaks=breaks, stops=stops, dwells=dwells)
 
     @cached_property
     def length(self) -> float:
@@ -173,7 +239,8 @@ class Path:
         """Values of s between which the path is analytic, from its start to its end, including the breaks."""
         inner_knots = [self.breaks]
         for (begin, end), span in zip(pairwise(self.breaks), self.spans, strict=True):
-            knots = begin + (span.curve.knots - span.first) / self.total
+            sigma = span.curve.knots - span.first
+            knots = begin + span.direction * sigma / self.total
             # The ends of a piece may be knots of its curve, up to rounding.
             is_inner = (knots > begin + tolerances.PATH) & (
                 knots < end - tolerances.PATH
@@ -195,11 +262,17 @@ class Path:
         spans = list(self.spans[first : last + 1])
         before = (begin - self.breaks[first]) * self.total
         after = (end - self.breaks[last + 1]) * self.total
-        spans[0] = replace(spans[0], first=spans[0].first + before)
-        spans[-1] = replace(spans[-1], last=spans[-1].last + after)
+        start = spans[0].first + spans[0].direction * before
+        spans[0] = replace(spans[0], first=start)
+        stop = spans[-1].last + spans[-1].direction * after
+        spans[-1] = replace(spans[-1], last=stop)
         breaks = np.concatenate([[begin], inside, [end]])
-        stops = self.stops[(self.stops > begin) & (self.stops < end)]
-        return replace(self, spans=tuple(spans), breaks=breaks, stops=stops)
+        is_inside = (self.stops > begin) & (self.stops < end)
+        stops = self.stops[is_inside]
+        dwells = self.dwells[is_inside]
+        return replace(
+            self, spans=tuple(spans), breaks=breaks, stops=stops, dwells=dwells
+        )
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
@@ -231,8 +304,21 @@ class Path:
     def _on_span(self, i: int, s: Array, order: int) -> Array:
         """Return coordinates and derivatives with respect to sigma, (order + 1, K, m), on the curve of one piece."""
         span = self.spans[i]
-        sigma = span.first + (s - self.breaks[i]) * self.total
-        return span.curve.derivatives(sigma, order)
+        sigma = span.first + span.direction * (s - self.breaks[i]) * self.total
+        result = span.curve.derivatives(sigma, order)
+        if span.direction < 0.0:
+            result[1::2] *= -1.0
+        return result
+
+
+def _is_smooth(ends: PathSample) -> bool:
+    """Tell whether a closed path, sampled at both ends, closes without a jump of its first three derivatives."""
+    size = np.linalg.norm(ends.xi[0])
+    return all(
+        np.linalg.norm(derivative[1] - derivative[0])
+        <= tolerances.WRITTEN * max(size, np.linalg.norm(derivative))
+        for derivative in (ends.xi, ends.xi_ds, ends.xi_dds)
+    )
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:

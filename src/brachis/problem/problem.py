@@ -127,8 +127,10 @@ class Problem(Summary):
         )
         limits = check_postures(task, task_map, limits, problem.given_postures, path)
         if end is not None and not task.boundary.periodic:
-            end = _on_path(task_map, end, path)
-        return replace(problem, limits=limits, end=end)
+            end = _on_path(task_map, end, path, 1.0)
+        if start is not None and task.begins_elsewhere:
+            start = _on_path(task_map, start, path, 0.0)
+        return replace(problem, limits=limits, start=start, end=end)
 
     @property
     def is_chain(self) -> bool:
@@ -213,9 +215,11 @@ class Problem(Summary):
         return first, last
 
 
-def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture, (n,), at the end of the path that is closest to a given one, which may already be there."""
-    place = path.sample(np.ones(1)).target
+def _on_path(
+    task_map: TaskMap, posture: np.ndarray, path: Path, s: float
+) -> np.ndarray:
+    """Return the posture, (n,), at s on the path that is closest to a given one, which may already be there."""
+    place = path.sample([s]).target
     if not task_map.m:
         return posture
     if isinstance(task_map, JointSpace):

@@ -24,6 +24,7 @@ from brachis.task.fields import (
     Flag,
     Mistake,
     Name,
+    Number,
     Version,
     check_defined,
     must,
@@ -83,6 +84,8 @@ _OF_PATHS = {
     "path": (),
     "path_start": None,
     "path_frame": None,
+    "path_reversed": False,
+    "path_begin": 0.0,
     "boundary": BoundarySettings(),
     "tool_limits.process_speed": (),
     **_CHOICES,
@@ -143,6 +146,11 @@ class Task(CheckedModel):
     """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
     """Frame in which path and path_start are given. Null: the world."""
+    path_reversed: Flag = False
+    """Whether the tool travels the path backwards, with the same pose at every place. start is then at its end."""
+    path_begin: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.0
+    """Fraction of a closed path at which the tool begins, instead of at path_start. The tool stops where the ends of
+    the path meet in a corner. All values of s are along the path as it is travelled."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -286,7 +294,20 @@ class Task(CheckedModel):
         is_free = self.start == "free"
         has_path_start = self.path_start is not None
         is_pose = isinstance(self.path_start, ToolPose)
-        if is_free and not (has_path_start or is_unread) and self.start_place is None:
+        is_stated = has_path_start or is_unread or self.start_place is not None
+        if self.begins_elsewhere and self.task_space == "joints":
+            yield (
+                "path_reversed" if self.path_reversed else "path_begin",
+                "a joint path begins where it is written to begin",
+                "false and 0, with task_space: joints",
+            )
+        elif self.begins_elsewhere and not is_stated:
+            yield (
+                "path_start",
+                "the path begins elsewhere than at the start posture, but its start is missing",
+                self._start_forms,
+            )
+        elif is_free and not is_stated:
             if self.task_space == "joints":
                 yield (
                     "start",
@@ -408,6 +429,11 @@ class Task(CheckedModel):
         """Whether the path prescribes the orientation of the tool or of its axis."""
         space = self.task_space
         return space in {"pose", "pose_free_roll"} or "axis" in space
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether the tool begins the path elsewhere than the path is written to begin."""
+        return self.path_reversed or self.path_begin > 0.0
 
     @property
     def start_place(self) -> StartPlace:
