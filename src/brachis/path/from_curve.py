@@ -194,7 +194,7 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     tables: list[Array] = []
     goes_on = False  # whether the last table applies up to the end of its segment
     for (begin, end), span in zip(pairwise(path.breaks), path.spans, strict=True):
-        if len(span.segments) > 1:
+        if len(span.segments) != 1:
             continue
         segment = segments[span.segments[0]]
         speeds = getattr(segment.shape, "speeds", ())

@@ -77,7 +77,10 @@ class ProblemChain(Problem):
         is_closed : bool
         """
         waiting = tuple(
-            replace(part, legs=(*part.legs[:-1], replace(part.legs[-1], dwell=wait)))
+            replace(
+                part.waiting(wait),
+                variants=tuple(variant.waiting(wait) for variant in part.variants),
+            )
             for part, wait in zip(parts, waits, strict=True)
         )
         known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
@@ -90,9 +93,9 @@ class ProblemChain(Problem):
             is_closed=is_closed,
         )
 
-    def reordered(self, order: Sequence[int]) -> ProblemChain:
-        """Return the chain with its parts in another order."""
-        chained = tuple(self.chained[number] for number in order)
+    def reordered(self, order: Sequence[int], parts: Sequence[Problem]) -> ProblemChain:
+        """Return the chain with parts, or variants of them, whose numbers are `order`."""
+        chained = tuple(parts)
         return replace(
             self,
             chained=chained,

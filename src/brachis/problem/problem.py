@@ -64,6 +64,8 @@ class Problem(Summary):
         Limits that are not in the task, as the user gave them.
     beside : tuple of (E, n) ndarray or None
         Postures from which the arm comes, and postures to which it goes on, if they are known.
+    variants : tuple of Problem
+        The same path travelled otherwise, if the planner chooses how: backwards, or from another place on.
     """
 
     task: Task
@@ -77,6 +79,7 @@ class Problem(Summary):
     time_laws: tuple[TimeLaw | None, ...]
     own_limits: tuple[LimitModel, ...] = ()
     beside: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
+    variants: tuple[Problem, ...] = ()
 
     @classmethod
     def of(
@@ -131,6 +134,11 @@ class Problem(Summary):
         if start is not None and task.begins_elsewhere:
             start = _on_path(task_map, start, path, 0.0)
         return replace(problem, limits=limits, start=start, end=end)
+
+    def waiting(self, wait: float) -> Problem:
+        """Return the problem with a wait at its end, s."""
+        last = replace(self.legs[-1], dwell=wait)
+        return replace(self, legs=(*self.legs[:-1], last))
 
     @property
     def is_chain(self) -> bool:

@@ -46,6 +46,8 @@ from brachis.task.segments import LineSegment, LineTo, SegmentModel
 from brachis.task.settings import Payload
 
 _PLACES = len(POSITION)
+_BEGINS = 8
+"""Number of places, evenly spaced, at which a closed path may begin if the planner chooses."""
 
 
 def bind_task(
@@ -72,6 +74,11 @@ def bind_task(
         stated = dict(zip(("start", "end"), postures, strict=True))
         part_task = _task_of(stretch, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
+        variants = [
+            Problem.of(changed, part_task.model_copy(update=keys), own_limits)
+            for keys in _variants(stretch, problem.path)
+        ]
+        problem = replace(problem, variants=tuple(variants))
         if before is not None:
             _check_meet(before, problem, stretch)
         problems.append(problem)
@@ -227,6 +234,14 @@ def _task_of(
     if isinstance(limited, MovePart):
         return task.model_copy(update=changes)
     changes |= path_keys(limited)
+    if "free" in (limited.path_reversed, limited.path_begin) and _has_places(
+        changes["tool_limits"]
+    ):
+        raise TaskError(
+            "if the planner chooses how a path is travelled, values of s are not those of the path",
+            where=f"{stretch.key}.tool_limits",
+            allowed="speed in the segments of the path",
+        )
     segments = _segments(stretch)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})
     changes["path"] = (*segments[:-1], ending)
@@ -258,6 +273,24 @@ def _task_of(
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
     return validate(Task, task.model_copy(update=changes), stretch.key)
+
+
+def _variants(stretch: _Stretch, path: Path) -> Iterator[dict[str, Any]]:
+    """Yield the keys of the task of a stretch for every other way in which its path may be travelled."""
+    for part in stretch.of(PathPart):
+        is_reversed = part.path_reversed
+        begin = part.path_begin
+        turns = (False, True) if is_reversed == "free" else (is_reversed,)
+        begins = [begin]
+        if begin == "free":
+            stops = path.stops[path.dwells == 0.0]
+            begins = np.unique([*np.arange(_BEGINS) / _BEGINS, *stops]).tolist()
+        ways = [
+            {"path_reversed": turn, "path_begin": place}
+            for place in begins
+            for turn in turns
+        ]
+        yield from ways[1:]
 
 
 def _check_meet(before: Problem, after: Problem, stretch: _Stretch) -> None:

@@ -24,7 +24,6 @@ from brachis.task.fields import (
     Flag,
     Mistake,
     Name,
-    Number,
     Version,
     check_defined,
     must,
@@ -35,6 +34,7 @@ from brachis.task.orientation import StartPlace, ToolPose
 from brachis.task.paths import (
     FreePosture,
     JointValues,
+    PathBegin,
     PathStart,
     Posture,
     RedundantJoints,
@@ -147,10 +147,10 @@ class Task(CheckedModel):
     path_frame: Name | None = None
     """Frame in which path and path_start are given. Null: the world."""
     path_reversed: Flag = False
-    """Whether the tool travels the path backwards, with the same pose at every place. start is then at its end."""
-    path_begin: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.0
-    """Fraction of a closed path at which the tool begins, instead of at path_start. The tool stops where the ends of
-    the path meet in a corner. All values of s are along the path as it is travelled."""
+    """Whether the tool travels the path backwards, in the same poses. start is then at the end of the path."""
+    path_begin: PathBegin = 0.0
+    """Fraction of a closed path at which the tool begins. It stops where the ends of the path meet in a corner. Values of
+    s are along the path as travelled."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -434,6 +434,13 @@ class Task(CheckedModel):
     def begins_elsewhere(self) -> bool:
         """Whether the tool begins the path elsewhere than the path is written to begin."""
         return self.path_reversed or self.path_begin > 0.0
+
+    @property
+    def travel(self) -> str:
+        """Say how the path is travelled, if not as it is written: where it begins, and whether it is reversed."""
+        begin = f"from s = {self.path_begin:.3g}" if self.path_begin else ""
+        turn = "reversed" if self.path_reversed else ""
+        return ", ".join(filter(None, (begin, turn)))
 
     @property
     def start_place(self) -> StartPlace:

@@ -24,6 +24,7 @@ from brachis.task.fields import (
 from brachis.task.limit_models import LimitSpec, ToolLimits
 from brachis.task.messages import validate
 from brachis.task.paths import (
+    PathBegin,
     PathStart,
     Posture,
     RedundantJoints,
@@ -82,12 +83,23 @@ class PathPart(LimitedPart):
     """As path_start of a task. Null: the first waypoint, or the end of the part before."""
     path_frame: Name | None = None
     """As path_frame of a task."""
+    path_reversed: Literal[False, True, "free"] = False
+    """As path_reversed of a task. free: the planner chooses."""
+    path_begin: Annotated[
+        Literal["free"] | PathBegin, ByForm("free, or a number from 0 to below 1")
+    ] = 0.0
+    """As path_begin of a task. free: the planner chooses one of eight places, or of the stops of the path."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """As tolerances of a task."""
     redundant_joints: RedundantJoints = "auto"
     """As redundant_joints of a task."""
     branch: Name = "auto"
     """As branch of a task."""
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether the tool begins, or may begin, the path elsewhere than the path is written to begin."""
+        return bool(self.path_reversed or self.path_begin)
 
     @model_validator(mode="before")
     @classmethod
@@ -212,17 +224,23 @@ def scene_during(
 
 
 def path_keys(part: PathPart) -> dict[str, Any]:
-    """Return the keys of a task for the path of a part."""
+    """Return the keys of a task for the path of a part; what is free is as the path is written."""
     keys = (
         "path",
         "task_space",
         "path_start",
         "path_frame",
+        "path_reversed",
+        "path_begin",
         "tolerances",
         "redundant_joints",
         "branch",
     )
-    return {key: getattr(part, key) for key in keys}
+    values = {key: getattr(part, key) for key in keys}
+    for key in ("path_reversed", "path_begin"):
+        if values[key] == "free":
+            del values[key]
+    return values
 
 
 def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -334,6 +352,14 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 key,
                 "a retract leads away from a path",
                 "a path before it, and a move or nothing after it",
+            )
+        if getattr(part, "begins_elsewhere", False) and (
+            before not in ("move", None) or after not in ("move", None)
+        ):
+            yield (
+                f"{key}.path_reversed",
+                "a path that begins elsewhere than it is written lies between moves",
+                "a move or nothing on both sides",
             )
         if isinstance(part, PathPart) and part.task_space in (None, "free"):
             yield (
