@@ -241,9 +241,9 @@ path:
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
 ```
 
-With `profile: uniform` the tool turns by the same angle in every metre. If
-the next segment turns differently, the turning rate jumps. Then use `profile: smooth` (the rate and its first two derivatives are zero at both ends) or a `blend`, which rounds position and
-orientation.
+With `profile: uniform` the tool turns by the same angle in every metre. If the next segment turns differently, the
+turning rate jumps. Then use `profile: smooth` (the rate and its first two derivatives are zero at both ends) or a
+`blend`, which rounds position and orientation.
 
 With `tangent` or `{tangent: {up: ...}}` the tool keeps its orientation in a frame with x along the tangent and y along
 up x tangent. The tool turns about `up` if the path turns, and pitches if the path rises. The angle between `up` and the

@@ -121,11 +121,6 @@ class CurveSpan:
         """1.0, or -1.0 if the curve is travelled backwards."""
         return -1.0 if self.last < self.first else 1.0
 
-    @property
-    def backwards(self) -> CurveSpan:
-        """The span, travelled the other way round."""
-        return replace(self, first=self.last, last=self.first)
-
 
 @dataclass(frozen=True, eq=False)
 class Path:
@@ -219,7 +214,9 @@ class Path:
             stops = stops[order]
             dwells = dwells[order]
         if is_reversed:
-            spans = tuple(span.backwards for span in spans[::-1])
+            spans = tuple(
+                replace(span, first=span.last, last=span.first) for span in spans[::-1]
+            )
             stops = 1.0 - stops[::-1]
             dwells = dwells[::-1]
         breaks = sum_up([span.length for span in spans]) / self.total

@@ -149,8 +149,8 @@ class Task(CheckedModel):
     path_reversed: Flag = False
     """Whether the tool travels the path backwards, in the same poses. start is then at the end of the path."""
     path_begin: PathBegin = 0.0
-    """Fraction of a closed path at which the tool begins. It stops where the ends of the path meet in a corner. Values of
-    s are along the path as travelled."""
+    """Fraction of a closed path at which the tool begins. It stops where the ends of the path meet in a corner. Values
+    of s are along the path as travelled."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
