@@ -1,5 +1,7 @@
 """Paths that are travelled backwards, and closed paths that begin elsewhere: places, derivatives, stops and speeds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -207,3 +209,20 @@ def test_a_reversed_seam_is_planned_saved_and_verified(tmp_path):
     assert result.t_end == pytest.approx(written.t_end, rel=1e-4)
     with pytest.raises(brachis.errors.StartError, match="off the path"):
         brachis.plan("gantry2", path=seam, start=[0.3, 0.2], path_reversed=True, **keys)
+
+
+def test_the_tool_of_a_reversed_seam_is_where_the_path_leads():
+    """By Pinocchio's placements, and by a verification that does not accept the path as it is written."""
+    arc = {"center": [0.5, 0.0, 0.4], "angle_deg": 60, "normal": [0, 0, 1]}
+    keys = {"path_start": POSE, "task_space": "pose", "path_reversed": True}
+    task = task_of([{"arc": arc, "orientation": TURN}], **keys)
+    motion = brachis.plan(task, effort="single").trajectory
+    t = np.linspace(0.0, motion.t_end, 41)
+    places, rotations = motion.robot.tool_placements(motion.position(t))
+    written = path_for(task.path, path_start=POSE, task_space="pose")
+    target = written.sample(1.0 - motion.path_coordinate(t)).target
+    assert_allclose(places, target[:, :3], atol=1e-8)
+    assert_allclose(rotations.reshape(-1, 9), target[:, 3:], atol=1e-8)
+    forwards = task.model_copy(update={"path_reversed": False})
+    assert brachis.verify_trajectory(motion).passed
+    assert not brachis.verify_trajectory(replace(motion, task=forwards)).passed

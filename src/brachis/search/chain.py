@@ -353,8 +353,9 @@ class _ChainSearch:
         )
         guesses: list[InitialGuess] = []
         errors: list[PathError] = []
+        deadline = self.deadline.part(1.0 / len(self.problem.parts))
         for variant in (part, *part.variants):
-            if guesses and self.deadline.passed:
+            if guesses and deadline.passed:
                 break
             first = variant.start if start is None else start
             changed = replace(variant, beside=beside, start=first)
