@@ -98,8 +98,8 @@ def _list_ends(problem: Problem, answer: OptimalMotion) -> Iterator[TaskSaving]:
         return
     for end, name in ((0, "start"), (-1, "end")):
         key = f"{name}_speed"
-        speed = getattr(boundary, key)
-        if problem.end_rates[end] and not speed:
+        speed = boundary.given_speeds[end]
+        if bool(problem.end_rates[end] or boundary.speeds[end]) and not speed:
             continue
         length = path_speed(problem.task_map, problem.path, float(-end))
         mean = length / answer.program.end_time(answer.x)

@@ -323,6 +323,11 @@ class Boundary:
         return self.start[0].rate, self.end[0].rate
 
     @property
+    def has_free_speeds(self) -> bool:
+        """Whether the speed of the first curve is free at an end."""
+        return not (len(self.start[0].derivatives) and len(self.end[0].derivatives))
+
+    @property
     def ahead(self) -> np.ndarray:
         """Distance by which the end of each curve is ahead of its start, (c,); zero if the distance is free."""
         pairs = zip(self.start, self.end, strict=True)

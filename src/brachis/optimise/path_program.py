@@ -27,7 +27,10 @@ class PathProgram(PhaseSequence[PathPhase]):
         super().__init__(phases)
         first = self.first_variables
         self.start = np.concatenate([phase.start for phase in self.phases])
-        self._links = [link for link in links if isinstance(link, PostureLink)]
+        # Phases meet at rest.
+        self._links = [
+            link for link in links if isinstance(link, PostureLink) and 0 in link.orders
+        ]
         joins = [
             (link.before, link.after, link.curves)
             for link in links

@@ -206,12 +206,12 @@ def begin_with_timing(
 
 
 def is_timing_all(program: Program) -> bool:
-    """Tell whether the phase plane covers all limits, and all phases meet at rest."""
-    is_linked = any(max(link.orders) for link in program.links)
+    """Tell whether the phase plane covers all limits, and all speeds where phases begin and end are given."""
+    has_free_speeds = any(phase.boundary.has_free_speeds for phase in program.phases)
     is_periodic = any(phase.boundary.periodic for phase in program.phases)
     has_laws = any(phase.time_law is not None for phase in program.phases)
     left_out = any(map(is_left_out, program.limits))
-    return not (is_linked or is_periodic or has_laws or left_out)
+    return not (has_free_speeds or is_periodic or has_laws or left_out)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from brachis.optimise.mesh import COARSE_INTERVALS
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.problem.problem import Problem
+from brachis.task import FREE
 
 _FOR_SPEEDS = 12
 """Number of intervals of each phase in the first mesh if a speed is given. With 20, plans took two to three times as
@@ -101,14 +102,16 @@ def program_over(
             grid = grids[first + number]
             pause = part.legs[number].dwell
             phases.append(Phase(joint_map, part.limits, grid, boundary, pause=pause))
-    for before, after in problem.joins:
+    for before, after, orders in problem.joins:
         last_phase = firsts[before] + len(problem.parts[before].legs) - 1
-        links.append(_join(phases, last_phase, firsts[after]))
+        links.append(_join(phases, last_phase, firsts[after], orders))
     return Program(phases, links)
 
 
-def _join(phases: Sequence[Phase], before: int, after: int) -> PostureLink:
-    """Link the postures in which one part ends and another begins."""
+def _join(
+    phases: Sequence[Phase], before: int, after: int, orders: tuple[int, ...]
+) -> PostureLink:
+    """Link the postures, or their derivatives of some orders, in which one part ends and another begins."""
     maps = [phases[number].joint_map for number in (before, after)]
     joints = min(joint_map.robot.n for joint_map in maps)
     combinations = np.eye(joints)
@@ -116,7 +119,7 @@ def _join(phases: Sequence[Phase], before: int, after: int) -> PostureLink:
         # Both postures meet the path, so only the self-motion is left.
         most = max(maps, key=lambda joint_map: joint_map.r)
         combinations = most.self_motion_rows(float(most is maps[0]))
-    return PostureLink(before, after, (0,), combinations)
+    return PostureLink(before, after, orders, combinations)
 
 
 def maps_by_leg(
@@ -157,7 +160,9 @@ def _is_at_rest(problem: Problem, number: int, side: int) -> bool:
     before = number - 1 if side == 0 else number
     if 0 <= before < len(problem.legs) - 1:
         return problem.legs[before].stops
-    return not problem.task.boundary.periodic and not problem.leg_rates[number][side]
+    boundary = problem.task.boundary
+    is_free = boundary.periodic or boundary.speeds[side] == FREE
+    return not is_free and not problem.leg_rates[number][side]
 
 
 def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
@@ -171,6 +176,8 @@ def _derivatives_of_s(problem: Problem, number: int, side: int) -> np.ndarray:
             return np.empty(0)
         derivatives = time_law.ends[-1 - side]
         return derivatives[1 : 1 + derivatives_in_motion(problem)]
+    if problem.task.boundary.speeds[side] == FREE:
+        return np.empty(0)
     derivatives = np.zeros(problem.task.spline.vanishing)
     derivatives[0] = problem.leg_rates[number][side]
     return derivatives

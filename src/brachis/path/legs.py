@@ -15,7 +15,7 @@ from brachis.path.sequence import Path, path_speed, tool_derivatives
 from brachis.robot import TaskMap, task_map_of
 from brachis.robot.task_map import JointSpace
 from brachis.robot.task_map.protocol import AXES
-from brachis.task import ProcessSpeed, Task, ToolLimits
+from brachis.task import FREE, ProcessSpeed, Task, ToolLimits
 from brachis.task.messages import validate
 
 _KEY = "tool_limits.process_speed"
@@ -99,9 +99,10 @@ def with_held_speeds(task: Task, task_map: TaskMap, path: Path) -> Task:
     if not sections:
         return task
     after = dict.fromkeys(path.stops.tolist(), 0.0)
-    if not task.boundary.periodic:
-        after[0.0] = _speed_at_end(task, task_map, path, 0)
-        after[1.0] = _speed_at_end(task, task_map, path, 1)
+    for end, speed in enumerate(task.boundary.speeds):
+        # Where the speed is free, the tool may pass at the speed of the section.
+        if not (task.boundary.periodic or speed == FREE):
+            after[float(end)] = _speed_at_end(task, task_map, path, end)
     before = {section.s[1]: section.speed for section in sections} | after
     if task.boundary.periodic and 1.0 in before:
         before[0.0] = before[1.0]
@@ -179,7 +180,7 @@ def _tool_slope(task_map: TaskMap, path: Path, s: float) -> float:
 
 def _speed_at_end(task: Task, task_map: TaskMap, path: Path, end: int) -> float:
     """Return the speed of the tool at the start, 0, or end, 1, of the path, m/s."""
-    stated = (task.boundary.start_speed, task.boundary.end_speed)[end]
+    stated = task.boundary.given_speeds[end]
     slope = _tool_slope(task_map, path, end)
     return stated * slope / path_speed(task_map, path, end)
 

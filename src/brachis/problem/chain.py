@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
-from brachis.problem.problem import Problem
-from brachis.task import Mark
+from brachis.problem.problem import Join, Problem
+from brachis.task import FREE, Mark
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Section:
 class ProblemChain(Problem):
     """A problem whose motion consists of the motions of other problems.
 
-    Its legs and time laws are those of all parts; the parts have limits of their own. The arm stops between the parts.
+    Its legs and time laws are those of all parts; the parts have limits of their own. The arm stops between the parts, unless it flies.
 
     Attributes
     ----------
@@ -90,13 +90,24 @@ class ProblemChain(Problem):
             is_closed=is_closed,
         )
 
-    def reordered(self, order: Sequence[int]) -> ProblemChain:
-        """Return the chain with its parts in another order."""
-        chained = tuple(self.chained[number] for number in order)
+    @property
+    def flights(self) -> list[list[int]]:
+        """Numbers of the parts, divided where the arm stops; a single list if the last part flies into the first."""
+        last = len(self.chained) - 1
+        flights: list[list[int]] = [[]]
+        for number in range(last + 1):
+            flights[-1].append(number)
+            if number < last and not (self.flies(number) or self.flies(last)):
+                flights.append([])
+        return flights
+
+    def only(self, numbers: Sequence[int]) -> ProblemChain:
+        """Return the chain of some of the parts, or of all in another order."""
+        chained = tuple(self.chained[number] for number in numbers)
         return replace(
             self,
             chained=chained,
-            sections=tuple(self.sections[number] for number in order),
+            sections=tuple(self.sections[number] for number in numbers),
             legs=tuple(leg for part in chained for leg in part.legs),
             time_laws=tuple(law for part in chained for law in part.time_laws),
         )
@@ -116,15 +127,23 @@ class ProblemChain(Problem):
         parts = (*self.chained[:number], part, *self.chained[number + 1 :])
         return replace(self, chained=parts)
 
+    def flies(self, number: int) -> bool:
+        """Tell whether the arm passes from the part with a number to the next one without a stop."""
+        return self.chained[number].task.boundary.end_speed == FREE
+
     @property
-    def joins(self) -> list[tuple[int, int]]:
-        """Numbers of the parts before and after each place where postures are free and must be equal."""
-        numbers = range(len(self.chained))
-        pairs = list(pairwise(numbers))
-        if self.is_closed:
-            pairs.append((numbers[-1], 0))
-        return [
-            (before, after)
-            for before, after in pairs
-            if self.chained[before].end is None or self.chained[after].start is None
-        ]
+    def joins(self) -> list[Join]:
+        """Each place where two parts meet in motion, or in a posture that is free."""
+        last = len(self.chained) - 1
+        pairs = list(pairwise(range(last + 1)))
+        if self.is_closed or self.flies(last):
+            pairs.append((last, 0))
+        joins = []
+        for before, after in pairs:
+            ends = self.chained[before].end, self.chained[after].start
+            orders = [0] if any(posture is None for posture in ends) else []
+            if self.flies(before):
+                orders += range(1, min(3, self.task.spline.degree))
+            if orders:
+                joins.append((before, after, tuple(orders)))
+        return joins

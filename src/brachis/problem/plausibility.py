@@ -204,8 +204,9 @@ def _tool(task: Task) -> Iterator[Issue]:
         yield from _figure(f"tool_limits.{key}", _largest(figures))
     meant = "degrees per second" if task.task_space == "joints" else "mm/s"
     message = f"the speed looks like {meant}"
-    for key in ("start_speed", "end_speed"):
-        value = _largest([getattr(task.boundary, key)])
+    for name, speed in zip(("start", "end"), task.boundary.given_speeds, strict=True):
+        key = f"{name}_speed"
+        value = _largest([speed])
         yield from issue_above(f"boundary.{key}", message, value, 50.0, task.speed_unit)
 
     for i, segment in enumerate(task.path):

@@ -39,6 +39,9 @@ from brachis.robot.custom_limits import LimitModel
 from brachis.robot.task_map import JointSpace
 from brachis.task import Task
 
+Join = tuple[int, int, tuple[int, ...]]
+"""Numbers of the parts before and after a place, and the orders of the derivatives that must be equal there."""
+
 
 @dataclass(frozen=True, repr=False)
 class Problem(Summary):
@@ -145,8 +148,13 @@ class Problem(Summary):
         return part
 
     @property
-    def joins(self) -> list[tuple[int, int]]:
-        """Numbers of the parts before and after each place where postures are free and must be equal."""
+    def flights(self) -> list[list[int]]:
+        """Numbers of the parts, divided where the arm stops: one list, because there is only one part."""
+        return [[0]]
+
+    @property
+    def joins(self) -> list[Join]:
+        """Places where parts meet in motion, or in a free posture: none, because there is only one part."""
         return []
 
     @property
@@ -206,7 +214,7 @@ class Problem(Summary):
             rate = self._rate_between(-1, 0)
             return rate, rate
         rates = [self._law_rate(end, end) for end in (0, -1)]
-        for end, speed in enumerate((boundary.start_speed, boundary.end_speed)):
+        for end, speed in enumerate(boundary.given_speeds):
             if speed and self.time_laws[-end] is None:
                 rates[end] = speed / path_speed(self.task_map, self.path, float(end))
         first, last = rates

@@ -20,7 +20,9 @@ from brachis.problem.problem import Problem
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
 from brachis.task import (
+    FREE,
     ApproachPart,
+    BoundarySettings,
     DwellPart,
     LimitedPart,
     MovePart,
@@ -55,21 +57,31 @@ def bind_task(
     if not task.program:
         return Problem.of(robot, task, own_limits)
     lasting = tuple(body for body in task.scene if body.since == body.until is None)
-    whole_task = task.model_copy(update={"scene": lasting})
-    whole = replace(Problem.of(robot, whole_task, own_limits), task=task)
     stretches = list(
         _stretches(task) if task.order == "given" else _free_stretches(task)
     )
+    closing = FREE if stretches[-1].flies else 0.0
+    boundary = task.boundary.model_copy(
+        update={"start_speed": closing, "end_speed": closing}
+    )
+    whole_task = task.model_copy(update={"scene": lasting, "boundary": boundary})
+    whole = Problem.of(robot, whole_task, own_limits)
+    whole = replace(whole, task=task.model_copy(update={"boundary": boundary}))
     ends = [stretch.end for stretch in stretches]
     if ends[-1] == "free":
         ends[-1] = task.start if task.end == "start" else task.end
     problems: list[Problem] = []
     sections: list[list[Section]] = []
     begins = [task.start, *ends[:-1]]
-    for stretch, *postures in zip(stretches, begins, ends, strict=True):
+    flights = [stretches[-1].flies, *(stretch.flies for stretch in stretches)]
+    for number, (stretch, *postures) in enumerate(
+        zip(stretches, begins, ends, strict=True)
+    ):
         changed = _robot_of(robot, stretch)
         before = problems[-1] if problems else None
-        stated = dict(zip(("start", "end"), postures, strict=True))
+        stated: dict[str, Any] = dict(zip(("start", "end"), postures, strict=True))
+        speeds = [FREE if flies else 0.0 for flies in flights[number : number + 2]]
+        stated["boundary"] = BoundarySettings(start_speed=speeds[0], end_speed=speeds[1])
         part_task = _task_of(stretch, changed, task, before, stated)
         problem = Problem.of(changed, part_task, own_limits)
         if before is not None:
@@ -114,6 +126,11 @@ class _Stretch:
         return moves[0].move if moves and moves[0].move != NEXT else "free"
 
     @property
+    def flies(self) -> bool:
+        """Whether the arm passes on to the next stretch without a stop."""
+        return self.parts[-1][1].flies
+
+    @property
     def wait(self) -> float:
         """Time for which the arm waits at the end, s."""
         total = 0.0
@@ -151,7 +168,7 @@ def _has_places(limits: ToolLimits | None) -> bool:
 
 def _settings(part: PathPart) -> dict[str, Any]:
     """Return everything of a part but its path."""
-    return part.model_dump(exclude={"name", "path", "path_start", "events"})
+    return part.model_dump(exclude={"name", "path", "path_start", "events", "fly"})
 
 
 def _stretches(task: Task) -> Iterator[_Stretch]:
@@ -204,9 +221,9 @@ def _task_of(
     robot: Robot,
     task: Task,
     before: Problem | None,
-    stated: Mapping[str, Posture | str],
+    stated: Mapping[str, Any],
 ) -> Task:
-    """Return the task of a stretch, given the problem of the one before and the postures at both ends."""
+    """Return the task of a stretch, given the problem of the one before, and the postures and speeds at both ends."""
     if not stretch.of(LimitedPart):
         raise TaskError(
             "the payload or the scene changes between a path and its approach or retract",

@@ -1,13 +1,13 @@
-"""The end of a program's search part by part, where the parts meet at rest.
+"""The end of a program's search part by part, where the arm stops between the parts.
 
-Once the program over the path has found the postures in which the parts meet, each part can be finished by itself
-between these postures. A program over time of all parts, which is needed for given speeds and limits of third order,
+Once the program over the path has found the postures in which the arm stops, the parts between two stops can be
+finished by themselves. A program over time of all parts, which is needed for given speeds and limits of third order,
 would be large: for two seams with approaches it has a thousand variables, and was not solved within a minute.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +17,11 @@ from brachis.optimise.improve import SolvedProgram
 from brachis.optimise.program import Program
 from brachis.optimise.transcription import program_of
 from brachis.problem.chain import ProblemChain
-from brachis.problem.problem import Problem
 from brachis.search.stages import (
     Candidate,
     ChainGuess,
     FinishedCandidate,
+    InitialGuess,
     RankedCandidate,
     fail,
     rank,
@@ -54,39 +54,58 @@ def finish_by_parts(candidate: RankedCandidate, finish: Finish) -> Candidate:
     guess = candidate.guess
     assert isinstance(guess, ChainGuess)
     finished: list[FinishedCandidate] = []
-    problems = _between_postures(guess)
-    for part, problem in zip(guess.parts, problems, strict=True):
-        alone = replace(part, problem=problem, solver=guess.solver)
-        outcome = finish(rank(alone, program_of(problem, alone.maps_by_leg())))
+    # The program that explains the motion has the postures in which the arm stops as given ones.
+    chain = _between_postures(guess)
+    for numbers in chain.flights:
+        alone = _guess_of(guess, chain, numbers)
+        outcome = finish(rank(alone, program_of(alone.problem, alone.maps_by_leg())))
         if not isinstance(outcome, FinishedCandidate):
             return fail(candidate, outcome.status, outcome.reports)
         finished.append(outcome)
-    motion = compose(guess.problem, [outcome.trajectory for outcome in finished])
-    # The program that explains the motion has the postures in which the parts meet as given ones.
-    chain = guess.problem
-    assert isinstance(chain, ProblemChain)
-    chain = replace(chain, chained=tuple(problems))
+    motions = [outcome.trajectory for outcome in finished]
+    components = [
+        part
+        for motion in motions
+        for _, part in motion.components or [(0.0, motion)]
+    ]
+    motion = compose(guess.problem, components)
     known = replace(candidate, guess=replace(guess, problem=chain))
     return verify(known, candidate.reports, _together(finished), motion)
 
 
-def _between_postures(guess: ChainGuess) -> list[Problem]:
-    """Return the problems of the parts with given postures at both ends; a move leads from part to part."""
+def _guess_of(
+    guess: ChainGuess, chain: ProblemChain, numbers: Sequence[int]
+) -> InitialGuess:
+    """Return the guess of some successive parts of a program, given by their numbers."""
+    parts = [
+        replace(guess.parts[number], problem=chain.parts[number], solver=guess.solver)
+        for number in numbers
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    task = chain.task.model_copy(update={"start": "free", "end": "free"})
+    problem = replace(chain.only(numbers), task=task)
+    return ChainGuess.of_parts(problem, parts, np.inf)
+
+
+def _between_postures(guess: ChainGuess) -> ProblemChain:
+    """Return the problem with given postures where the arm stops; a move leads from part to part."""
+    chain = guess.problem
+    assert isinstance(chain, ProblemChain)
     ends = [part.postures_at(np.array([0.0, 1.0])) for part in guess.parts]
     count = len(ends)
-    problems = []
-    for number, (part, problem) in enumerate(
-        zip(guess.parts, guess.problem.parts, strict=True)
-    ):
-        start, end = ends[number]
-        if part.joint_map.is_move:
-            n = problem.robot.n
-            if problem.start is None:
-                start = ends[number - 1][1, :n]
-            if problem.end is None:
-                end = ends[(number + 1) % count][0, :n]
-        problems.append(replace(problem, start=start, end=end))
-    return problems
+    problems = list(chain.parts)
+    for flight in chain.flights:
+        for number, side in ((flight[0], 0), (flight[-1], 1)):
+            problem = problems[number]
+            posture = ends[number][side]
+            if guess.parts[number].joint_map.is_move:
+                beside = ends[(number - 1 + 2 * side) % count]
+                posture = beside[1 - side, : problem.robot.n]
+            name = ("start", "end")[side]
+            if getattr(problem, name) is None:
+                problems[number] = replace(problem, **{name: posture})
+    return replace(chain, chained=tuple(problems))
 
 
 def _together(parts: list[FinishedCandidate]) -> SolvedProgram:

@@ -175,7 +175,7 @@ class _ChainSearch:
         problem = self.problem
         options = chain.parts
         if problem.task.order == "free":
-            problem = problem.reordered([option.number for option in options])
+            problem = problem.only([option.number for option in options])
         else:
             options.sort(key=lambda option: option.number)
         guesses = []

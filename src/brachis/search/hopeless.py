@@ -113,9 +113,11 @@ def speeds_of(problem: Problem) -> list[_Speed]:
         speeds.append(_Speed(key, "process speed", process_speed.speed, "m/s", leg))
     last = len(problem.legs) - 1
     unit = problem.task.speed_unit
-    for name, leg, side in (("start", 0, 0), ("end", last, -1)):
+    ends = (("start", 0, 0), ("end", last, -1))
+    for (name, leg, side), figure in zip(
+        ends, problem.task.boundary.given_speeds, strict=True
+    ):
         key = f"boundary.{name}_speed"
-        figure = getattr(problem.task.boundary, f"{name}_speed")
         if figure and leg not in speed_legs:
             speeds.append(_Speed(key, f"{name} speed", figure, unit, leg, side))
     return speeds

@@ -121,7 +121,8 @@ def finish_candidate(
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
     program = candidate.program
-    if candidate.problem.is_chain and not (is_timing_all(program) or program.means):
+    is_divided = len(candidate.problem.flights) > 1
+    if is_divided and not (is_timing_all(program) or program.means):
         finish_part = partial(
             finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
         )

@@ -50,6 +50,8 @@ from brachis.task.segments import (
     Segment,
 )
 from brachis.task.settings import (
+    FREE,
+    BoundarySettings,
     FrictionSettings,
     Payload,
     Placement,
@@ -61,11 +63,13 @@ from brachis.task.settings import (
 from brachis.task.tolerances import Tolerances
 
 __all__ = [
+    "FREE",
     "FROM_URDF",
     "LIMIT_KINDS",
     "ROBOT_LIMITS",
     "AlongTangent",
     "ApproachPart",
+    "BoundarySettings",
     "CsvSegment",
     "DwellPart",
     "FitReport",

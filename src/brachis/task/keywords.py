@@ -85,8 +85,8 @@ class TaskKeywords(RobotKeywords, total=False):
     custom_limits: Mapping[str, Settings]
     strict: bool | None
     # boundary
-    start_speed: float
-    end_speed: float
+    start_speed: float | Literal["free"]
+    end_speed: float | Literal["free"]
     periodic: bool
     # spline
     degree: int

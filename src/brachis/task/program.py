@@ -15,6 +15,7 @@ from brachis.common.words import write_count
 from brachis.task.fields import (
     ByForm,
     ByKey,
+    Flag,
     Mistake,
     Model,
     Name,
@@ -59,9 +60,20 @@ class Part(Model):
     """Name of the part. Null: its kind and number."""
     events: tuple[Mark, ...] = ()
     """Events that are returned with their times."""
+    @property
+    def flies(self) -> bool:
+        """Whether the arm passes on to the next part without a stop."""
+        return getattr(self, "fly", False)
 
 
-class LimitedPart(Part):
+class FlyingPart(Part):
+    """A part from which the arm may pass on to the next one without a stop."""
+
+    fly: Flag = False
+    """Whether the arm passes on to the next part without a stop; one of the two is a move."""
+
+
+class LimitedPart(FlyingPart):
     """A part with limits of its own."""
 
     tool_limits: ToolLimits | None = None
@@ -117,7 +129,7 @@ class ApproachPart(Part):
     """Length, m."""
 
 
-class RetractPart(Part):
+class RetractPart(FlyingPart):
     """A straight way back from the end of the path before, along the tool's z axis."""
 
     kind: ClassVar[str] = "retract"
@@ -263,6 +275,7 @@ def find_mistakes(
         yield from _find_mistakes_if_free(parts)
         return
     yield from _find_wrong_order(parts)
+    yield from _find_wrong_flights(parts, is_closed=end == "start")
     ways = [part for part in parts if part.kind in _WAYS]
     if ways and isinstance(ways[-1], MovePart):
         yield from _find_wrong_end(ways, start, end, postures)
@@ -357,8 +370,24 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
         yield "program[0]", "the arm waits before it has moved", "a path or move first"
 
 
+def _find_wrong_flights(parts: Sequence[Part], *, is_closed: bool) -> Iterator[Mistake]:
+    """Yield the parts after which the arm cannot go on without a stop."""
+    followers = [*parts[1:], parts[0] if is_closed and len(parts) > 1 else None]
+    for number, (part, after) in enumerate(zip(parts, followers, strict=False)):
+        kinds = [part.kind, getattr(after, "kind", "dwell")]
+        if part.flies and not ("move" in kinds and set(kinds) <= set(_WAYS)):
+            yield (
+                f"program[{number}].fly",
+                "the arm cannot pass on without a stop here",
+                "a move before or after; segments of one path follow one another without a stop",
+            )
+
+
 def _find_mistakes_if_free(parts: Sequence[Part]) -> Iterator[Mistake]:
     """Yield the mistakes in a program whose order is free."""
+    for number, part in enumerate(parts):
+        if part.flies:
+            yield f"program[{number}].fly", "the arm stops before each move", "false"
     paths = [part for part in parts if isinstance(part, PathPart)]
     if not 2 <= len(paths) <= _MOST_FREE:
         yield (

@@ -373,15 +373,23 @@ def expand_solver_name(solver: object) -> object:
     return {"name": solver} if isinstance(solver, str) else solver
 
 
+FREE: Final = "free"
+"""Word for a speed that the planner chooses."""
+EndSpeed = Annotated[
+    Literal["free"] | Annotated[NonNegative, Field(le=1e6)],
+    ByForm("free, or a number"),
+]
+
+
 class BoundarySettings(CheckedModel):
     """Speeds at both ends of the path, or an endlessly repeated motion."""
 
-    start_speed: NonNegative = Field(default=0.0, le=1e6)
+    start_speed: EndSpeed = 0.0
     """Speed along the path at its start, m/s (rad/s if the tool only turns there; for a joint path the norm of the
     joint velocities). If it is not zero, the velocities of redundant joints are free there; with spline.rest: full the
-    speed is constant at that instant."""
-    end_speed: NonNegative = Field(default=0.0, le=1e6)
-    """Speed along the path at its end, in the same unit."""
+    speed is constant at that instant. free: the best speed, with any acceleration."""
+    end_speed: EndSpeed = 0.0
+    """Speed along the path at its end, in the same unit, or free."""
     periodic: Flag = False
     """Whether a closed path is repeated without stopping. It then ends with the posture (except for whole turns of
     joints without a range), velocity and acceleration of its start. With spline.degree: 2 the acceleration jumps
@@ -399,4 +407,15 @@ class BoundarySettings(CheckedModel):
     @property
     def in_motion(self) -> bool:
         """Whether the robot is in motion at an end of the path."""
-        return self.periodic or self.start_speed > 0.0 or self.end_speed > 0.0
+        return self.periodic or any(self.speeds)
+
+    @property
+    def speeds(self) -> tuple[float | str, float | str]:
+        """Speeds at the start and the end."""
+        return self.start_speed, self.end_speed
+
+    @property
+    def given_speeds(self) -> tuple[float, float]:
+        """Speeds at the start and the end; 0 if the planner chooses them."""
+        start, end = (0.0 if speed == FREE else speed for speed in self.speeds)
+        return float(start), float(end)

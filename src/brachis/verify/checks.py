@@ -14,6 +14,7 @@ from brachis.kernel import Spline, blossom
 from brachis.path.legs import Leg
 from brachis.robot import TaskMap
 from brachis.robot.joints import TURN, UNITS
+from brachis.task import FREE
 from brachis.trajectory import CONTINUOUS_TORQUE, MotionPhase
 from brachis.verify.limits.protocol import Worst, worst_between
 from brachis.verify.limits.tool import tool_sizes
@@ -79,7 +80,7 @@ def check_ends(motion: CheckedMotion) -> list[Check]:
     for name, number, s in (("start", 0, 0.0), ("end", -1, 1.0)):
         state = states.only([number])
         joints = task.joints_at(name)
-        speed = getattr(boundary, f"{name}_speed")
+        speed = boundary.speeds[number]
         if joints is not None:
             posture = motion.robot.posture(*joints)
             target = motion.path.sample(np.array([s])).target
@@ -89,10 +90,10 @@ def check_ends(motion: CheckedMotion) -> list[Check]:
             checks.append(
                 check_joints(motion, title, miss, state.t, "position", allowed)
             )
-        if boundary.periodic:
+        if boundary.periodic or speed == FREE:
             continue
         if speed:
-            checks += _check_speed(motion, name, speed, state)
+            checks += _check_speed(motion, name, float(speed), state)
         else:
             checks += check_rest(motion, f"{name} {{}}", state)
     return checks

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.common.arrays import spread
 from brachis.errors import BrachisWarning, InputError
 from brachis.path import path_of
 from brachis.robot import Robot, bind
@@ -209,14 +210,18 @@ def place_in_program(trajectory: Trajectory, begin: float, check: Check) -> Chec
 
 
 def _check_components(motion: CheckedMotion) -> Check:
-    """Check that the whole motion is that of its components, and at rest between them."""
+    """Check that the whole motion is that of its components, and at rest between them.
+
+    Between the nodes, the positions also show whether the velocities are equal where components meet.
+    """
     trajectory = motion.trajectory
     misses = []
     begins = [begin for begin, _ in trajectory.components[1:]]
     triples = zip(trajectory.components, [*begins, trajectory.t_end], strict=True)
     for (begin, part), next_begin in triples:
-        joints = trajectory.position(begin + part.times)
-        misses.append(np.abs(joints - part.q[:, : joints.shape[1]]).max())
+        times = spread(part.times, 4)
+        joints = trajectory.position((begin + times).clip(max=trajectory.t_end))
+        misses.append(np.abs(joints - part.position(times)[:, : joints.shape[1]]).max())
         waiting = np.linspace(min(begin + part.t_end, next_begin), next_begin, 5)
         misses.append(np.abs(trajectory.position(waiting) - joints[-1]).max())
     allowed = motion.options.posture_tolerance
