@@ -95,7 +95,7 @@ def test_stops_and_dwells_are_where_they_were():
     written = path_for(BENT)
     path = path_for(BENT, path_reversed=True)
     assert_allclose(path.stops, 1.0 - written.stops, atol=1e-12)
-    assert path.dwells.tolist() == [0.3]
+    assert [*path.dwells.values()] == [0.3]
     # At a stop, a sample is that of the curve after it.
     before, after = path.sample([path.stops[0] - 1e-12, path.stops[0]]).xi
     assert np.linalg.norm(before - after) > 0.1
@@ -162,7 +162,7 @@ def test_speeds_of_segments_stay_with_their_segments():
         (
             CIRCLE,
             {"path_reversed": True, "start": {"joints": [0] * 7}, "path_start": None},
-            "its start is missing",
+            "start of the path, which is missing",
         ),
         (
             [{"line": {"to": [0.1] * 7}}],
@@ -172,7 +172,7 @@ def test_speeds_of_segments_stay_with_their_segments():
                 "path_start": None,
                 "task_space": "joints",
             },
-            "a joint path begins where",
+            "a joint path leaves no choice",
         ),
     ],
 )

@@ -294,8 +294,7 @@ def build_path(
         curves.append(curve)
     spans = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
-    dwells = {i: segment.dwell for i, segment in enumerate(segments) if segment.stop}
-    return path_type.of(spans, positions, frame, dwells)
+    return path_type.of(spans, positions, frame)
 
 
 def _line_to(
@@ -334,7 +333,9 @@ def _join(
     for join in find_joins(curves, coordinates.rows):
         i = join.index
         size = segments[i].blend or 0.0
-        spans.append(CurveSpan(join.first, taken, join.first.length - size, (i,)))
+        dwell = segments[i].dwell if segments[i].stop else None
+        end = join.first.length - size
+        spans.append(CurveSpan(join.first, taken, end, (i,), dwell))
         taken = size
         if segments[i].stop:
             continue
@@ -371,7 +372,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     """
     if not task_map.m:
         nowhere = LineCurve(np.empty(0), np.empty(0), 1.0)
-        return Path.of((CurveSpan(nowhere, 0.0, 1.0),), 0, None, {})
+        return Path.of((CurveSpan(nowhere, 0.0, 1.0),), 0, None)
     frame = None
     if task.path_frame is not None:
         frame = PathFrame.of(place_frame(task.frames, task.path_frame), task_map.rows)

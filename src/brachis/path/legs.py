@@ -62,7 +62,7 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
         _check_task_space(task_map)
     for number, section in enumerate(sections):
         _check_motion(task_map, path, section, number)
-    dwells = dict(zip(path.stops.tolist(), path.dwells.tolist(), strict=True))
+    dwells = path.dwells
     ends = sorted({0.0, 1.0, *dwells, *(s for section in sections for s in section.s)})
     speeds = {section.s: section.speed for section in sections}
     return tuple(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -103,13 +103,15 @@ def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
 class CurveSpan:
     """The part of a curve from sigma = `first` to `last`, which is below `first` if the curve is travelled backwards.
 
-    `segments` has the index of its segment or, for a blend, of the two segments that the blend joins.
+    `segments` has the index of its segment or, for a blend, of the two segments that the blend joins. `dwell` is the
+    time for which the tool waits at the end, s; None if it does not stop there.
     """
 
     curve: Curve
     first: float
     last: float
     segments: tuple[int, ...] = ()
+    dwell: float | None = None
 
     @property
     def length(self) -> float:
@@ -139,10 +141,6 @@ class Path:
         Number of position rows among the coordinates.
     frame : PathFrame or None
         Frame in which the curves are given; None means the world.
-    stops : ndarray
-        Values of s at which the tool stops, ascending; only there may the path have corners.
-    dwells : ndarray
-        Time for which the tool waits at each stop, s.
     """
 
     spans: tuple[CurveSpan, ...]
@@ -150,8 +148,6 @@ class Path:
     total: float
     positions: int
     frame: PathFrame | None
-    stops: Array
-    dwells: Array
 
     @classmethod
     def of(
@@ -159,19 +155,25 @@ class Path:
         spans: tuple[CurveSpan, ...],
         positions: int,
         frame: PathFrame | None,
-        dwells: Mapping[int, float],
     ) -> Self:
-        """Join spans whose first `positions` rows are those of the position.
-
-        The tool stops at the ends of some segments, given by their indices, for the times `dwells`, s.
-        """
+        """Join spans whose first `positions` rows are those of the position."""
         ends = sum_up([span.length for span in spans])
         total = float(ends[-1])
-        breaks = ends / total
-        last = {span.segments: end for span, end in zip(spans, breaks[1:], strict=True)}
-        stops = np.array([last[segment,] for segment in dwells], dtype=float)
-        waits = np.array([*dwells.values()], dtype=float)
-        return cls(spans, breaks, total, positions, frame, stops, waits)
+        return cls(spans, ends / total, total, positions, frame)
+
+    @property
+    def dwells(self) -> dict[float, float]:
+        """Values of s inside the path at which the tool stops, with the time for which it waits there, s.
+
+        Only there may the path have corners.
+        """
+        ends = zip(self.breaks[1:-1].tolist(), self.spans[:-1], strict=True)
+        return {s: span.dwell for s, span in ends if span.dwell is not None}
+
+    @property
+    def stops(self) -> Array:
+        """Values of s inside the path at which the tool stops."""
+        return np.array([*self.dwells], dtype=float)
 
     def travelled(self, begin: float, *, is_reversed: bool) -> Self:
         """Return the path as it is travelled from s = `begin` on, if it is closed, and backwards if it is reversed.
@@ -184,8 +186,6 @@ class Path:
             The path is not closed, or the tool waits where it begins.
         """
         spans = self.spans
-        stops = self.stops
-        dwells = self.dwells
         if begin:
             ends = self.sample([0.0, 1.0])
             gap = float(np.abs(ends.target[1] - ends.target[0]).max())
@@ -196,33 +196,24 @@ class Path:
                     found=f"ends {gap:.3g} m or rad apart",
                     allowed="a path that ends where it begins, in all coordinates",
                 )
-            spans = self.between(begin, 1.0).spans + self.between(0.0, begin).spans
-            stops = (stops - begin) % 1.0
-            if not _is_smooth(ends):
-                stops = np.append(stops, 1.0 - begin)
-                dwells = np.append(dwells, 0.0)
-            is_inside = np.abs(stops - 0.5) < 0.5 - tolerances.PATH
-            if dwells[~is_inside].any():
+            before = self.between(0.0, begin).spans
+            after = self.between(begin, 1.0).spans
+            if before[-1].dwell:
                 raise PathError(
                     "the path begins where the tool waits",
                     where="path_begin",
                     found=begin,
                     allowed="a place without a dwell",
                 )
-            order = np.argsort(stops)
-            order = order[is_inside[order]]
-            stops = stops[order]
-            dwells = dwells[order]
+            meeting = replace(after[-1], dwell=None if _is_smooth(ends) else 0.0)
+            spans = (*after[:-1], meeting, *before)
         if is_reversed:
+            dwells = [span.dwell for span in spans[-2::-1]]
             spans = tuple(
-                replace(span, first=span.last, last=span.first) for span in spans[::-1]
+                replace(span, first=span.last, last=span.first, dwell=dwell)
+                for span, dwell in zip(spans[::-1], [*dwells, None], strict=True)
             )
-            stops = 1.0 - stops[::-1]
-            dwells = dwells[::-1]
-        breaks = sum_up([span.length for span in spans]) / self.total
-        breaks[-1] = 1.0
-        stops = breaks[np.searchsorted(breaks, stops - tolerances.PATH)]
-        return replace(self, spans=spans, breaks=breaks, stops=stops, dwells=dwells)
+        return self.of(spans, self.positions, self.frame)
 
     @cached_property
     def length(self) -> float:
@@ -262,14 +253,10 @@ class Path:
         start = spans[0].first + spans[0].direction * before
         spans[0] = replace(spans[0], first=start)
         stop = spans[-1].last + spans[-1].direction * after
-        spans[-1] = replace(spans[-1], last=stop)
+        dwell = spans[-1].dwell if after > -tolerances.PATH * self.total else None
+        spans[-1] = replace(spans[-1], last=stop, dwell=dwell)
         breaks = np.concatenate([[begin], inside, [end]])
-        is_inside = (self.stops > begin) & (self.stops < end)
-        stops = self.stops[is_inside]
-        dwells = self.dwells[is_inside]
-        return replace(
-            self, spans=tuple(spans), breaks=breaks, stops=stops, dwells=dwells
-        )
+        return replace(self, spans=tuple(spans), breaks=breaks)
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).

@@ -59,7 +59,6 @@ class ProblemChain(Problem):
         cls,
         whole: Problem,
         parts: Sequence[Problem],
-        waits: Sequence[float],
         sections: Sequence[Sequence[Section]],
         *,
         is_closed: bool,
@@ -71,24 +70,15 @@ class ProblemChain(Problem):
         whole : Problem
             The move from the start of the first part to the end of the last one, with the settings of the planner.
         parts : sequence of Problem
-        waits : sequence of float
-            Time for which the arm waits after each part, s.
         sections : sequence of sequence of Section
         is_closed : bool
         """
-        waiting = tuple(
-            replace(
-                part.waiting(wait),
-                variants=tuple(variant.waiting(wait) for variant in part.variants),
-            )
-            for part, wait in zip(parts, waits, strict=True)
-        )
         known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
-        known["legs"] = tuple(leg for part in waiting for leg in part.legs)
+        known["legs"] = tuple(leg for part in parts for leg in part.legs)
         known["time_laws"] = tuple(law for part in parts for law in part.time_laws)
         return cls(
             **known,
-            chained=waiting,
+            chained=tuple(parts),
             sections=tuple(map(tuple, sections)),
             is_closed=is_closed,
         )

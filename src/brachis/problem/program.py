@@ -88,10 +88,11 @@ def bind_task(
             start_speed=speeds[0], end_speed=speeds[1]
         )
         part_task = _task_of(stretch, changed, task, before, stated)
-        problem = Problem.of(changed, part_task, own_limits)
+        problem = Problem.of(changed, part_task, own_limits).waiting(stretch.wait)
+        tasks = _variants(stretch, part_task, problem.path)
         variants = [
-            Problem.of(changed, part_task.model_copy(update=keys), own_limits)
-            for keys in _variants(stretch, problem.path)
+            Problem.of(changed, variant, own_limits).waiting(stretch.wait)
+            for variant in tasks
         ]
         problem = replace(problem, variants=tuple(variants))
         if before is not None:
@@ -108,8 +109,7 @@ def bind_task(
                 where=f"{stretch.key}, robot.limits.rms_torque",
                 allowed="no such limit; verify the motion of the program against it",
             )
-    waits = [stretch.wait for stretch in stretches]
-    return ProblemChain.of_parts(whole, problems, waits, sections, is_closed=is_closed)
+    return ProblemChain.of_parts(whole, problems, sections, is_closed=is_closed)
 
 
 @dataclass
@@ -254,14 +254,6 @@ def _task_of(
     if isinstance(limited, MovePart):
         return task.model_copy(update=changes)
     changes |= path_keys(limited)
-    if "free" in (limited.path_reversed, limited.path_begin) and _has_places(
-        changes["tool_limits"]
-    ):
-        raise TaskError(
-            "if the planner chooses how a path is travelled, values of s are not those of the path",
-            where=f"{stretch.key}.tool_limits",
-            allowed="speed in the segments of the path",
-        )
     segments = _segments(stretch)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})
     changes["path"] = (*segments[:-1], ending)
@@ -269,9 +261,10 @@ def _task_of(
         changes["path_start"] = _end_of(before, changes)
     approaches = stretch.of(ApproachPart)
     retracts = stretch.of(RetractPart)
-    if (approaches or retracts) and _has_places(limited.tool_limits):
+    is_open = "free" in (limited.path_reversed, limited.path_begin)
+    if (approaches or retracts or is_open) and _has_places(changes["tool_limits"]):
         raise TaskError(
-            "with an approach or a retract, values of s are not those of the path alone",
+            "values of s are not those of the path alone with an approach, a retract or a travel that is free",
             where=f"{stretch.key}.tool_limits",
             allowed="speed in the segments of the path",
         )
@@ -295,21 +288,22 @@ def _task_of(
     return validate(Task, task.model_copy(update=changes), stretch.key)
 
 
-def _variants(stretch: _Stretch, path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the keys of the task of a stretch for every other way in which its path may be travelled."""
+def _variants(stretch: _Stretch, task: Task, path: Path) -> Iterator[Task]:
+    """Yield the task of a stretch, given with its path, for every other way in which the path may be travelled."""
     for part in stretch.of(PathPart):
         turns = [part.path_reversed]
         if part.path_reversed == "free":
             turns = [False, True]
         begins = [part.path_begin]
         if part.path_begin == "free":
-            stops = path.stops[path.dwells == 0.0]
-            if turns[0]:
-                stops = 1.0 - stops
-            places = np.append(np.arange(_BEGINS) / _BEGINS, stops)
+            stops = [s for s, dwell in path.dwells.items() if not dwell]
+            places = np.append(
+                np.arange(_BEGINS) / _BEGINS, np.abs(float(turns[0]) - np.array(stops))
+            )
             begins = np.unique(places.round(9)).tolist()
         for begin, turn in list(product(begins, turns))[1:]:
-            yield {"path_reversed": turn, "path_begin": begin}
+            keys = {"path_reversed": turn, "path_begin": begin}
+            yield task.model_copy(update=keys)
 
 
 def _check_meet(before: Problem, after: Problem, stretch: _Stretch) -> None:

@@ -6,7 +6,6 @@ the limits of the postures at which it ends. The best chains are improved as a w
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -67,11 +66,6 @@ class _Option:
     number: int = -1
     time: float = 0.0
     guess: InitialGuess | None = None
-
-    @property
-    def variant(self) -> Problem | None:
-        """The problem of the joint path."""
-        return None if self.guess is None else self.guess.problem
 
     @classmethod
     def at(cls, posture: np.ndarray) -> _Option:
@@ -268,15 +262,16 @@ class _ChainSearch:
                 moves = (self._price(number - 1, chain, option) for chain in nearby)
                 prices.append(min(moves, default=0.0) + option.time)
             # The best joint path of every variant comes first: which is best depends on the order.
-            ranked: list[tuple[int, int, int]] = []
-            variants: Counter[int] = Counter()
-            for place, i in enumerate(np.argsort(prices, kind="stable").tolist()):
-                variant = id(options[i].variant)
-                ranked.append((variants[variant], place, i))
-                variants[variant] += 1
-            ranked.sort()
-            chosen = ranked[: _NODES // len(paths)]
-            options_of_all.append([options[i] for *_, i in chosen])
+            order = np.argsort(prices, kind="stable")
+            guesses = [options[i].guess for i in order]
+            variants = [id(guess and guess.problem) for guess in guesses]
+            ranks = [
+                variants[:place].count(variant)
+                for place, variant in enumerate(variants)
+            ]
+            order = order[np.argsort(ranks, kind="stable")]
+            chosen = order[: _NODES // len(paths)]
+            options_of_all.append([options[i] for i in chosen])
             nearby = nearby or [
                 begun.followed_by(option) for option in options_of_all[0]
             ]

@@ -78,14 +78,14 @@ _CHOICES = {
     "branch": "auto",
     "search.guesses": "lattice",
     "margins.singularity": None,
+    "path_reversed": False,
+    "path_begin": 0.0,
 }
-"""Keys that choose postures along a path of the tool, and their defaults."""
+"""Keys that choose postures along a path of the tool, or where it begins, and their defaults."""
 _OF_PATHS = {
     "path": (),
     "path_start": None,
     "path_frame": None,
-    "path_reversed": False,
-    "path_begin": 0.0,
     "boundary": BoundarySettings(),
     "tool_limits.process_speed": (),
     **_CHOICES,
@@ -295,19 +295,8 @@ class Task(CheckedModel):
         has_path_start = self.path_start is not None
         is_pose = isinstance(self.path_start, ToolPose)
         is_stated = has_path_start or is_unread or self.start_place is not None
-        if self.begins_elsewhere and self.task_space == "joints":
-            yield (
-                "path_reversed" if self.path_reversed else "path_begin",
-                "a joint path begins where it is written to begin",
-                "false and 0, with task_space: joints",
-            )
-        elif self.begins_elsewhere and not is_stated:
-            yield (
-                "path_start",
-                "the path begins elsewhere than at the start posture, but its start is missing",
-                self._start_forms,
-            )
-        elif is_free and not is_stated:
+        is_needed = is_free or (self.begins_elsewhere and self.task_space != "joints")
+        if is_needed and not is_stated:
             if self.task_space == "joints":
                 yield (
                     "start",
@@ -316,7 +305,7 @@ class Task(CheckedModel):
                 )
             yield (
                 "path_start",
-                "the start posture is free, but the start of the path is missing",
+                "the start posture is free, or not at the start of the path, which is missing",
                 self._start_forms,
             )
         if is_free and self.search.guesses == "numeric":
@@ -361,7 +350,7 @@ class Task(CheckedModel):
                 "a joint path cannot be in a frame",
                 "null, with task_space: joints",
             )
-        yield from self._changed(_CHOICES, "a joint path leaves no choice of postures")
+        yield from self._changed(_CHOICES, "a joint path leaves no choice")
 
     def _changed(self, defaults: Mapping[str, object], why: str) -> Iterator[Mistake]:
         """Refuse keys, given by their defaults, that this task space does not have."""

@@ -109,11 +109,6 @@ class PathPart(LimitedPart):
     branch: Name = "auto"
     """As branch of a task."""
 
-    @property
-    def begins_elsewhere(self) -> bool:
-        """Whether the tool begins, or may begin, the path elsewhere than the path is written to begin."""
-        return bool(self.path_reversed or self.path_begin)
-
     @model_validator(mode="before")
     @classmethod
     def _expand(cls, content: object) -> object:
@@ -250,10 +245,7 @@ def path_keys(part: PathPart) -> dict[str, Any]:
         "branch",
     )
     values = {key: getattr(part, key) for key in keys}
-    for key in ("path_reversed", "path_begin"):
-        if values[key] == "free":
-            del values[key]
-    return values
+    return {key: value for key, value in values.items() if value != "free"}
 
 
 def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -368,8 +360,10 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a retract leads away from a path",
                 "a path before it, and a move or nothing after it",
             )
-        is_between_moves = {before, after} <= {"move", None}
-        if getattr(part, "begins_elsewhere", False) and not is_between_moves:
+        begins_elsewhere = isinstance(part, PathPart) and (
+            part.path_reversed or part.path_begin
+        )
+        if begins_elsewhere and not {before, after} <= {"move", None}:
             yield (
                 f"{key}.path_reversed",
                 "a path that begins elsewhere than it is written lies between moves",
