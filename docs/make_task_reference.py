@@ -198,8 +198,6 @@ path:
     orientation: {rotate: {axis: [0, 1, 0], angle_deg: 30}}
 ```
 
-Rows that depend on each other, or that no joint changes, are refused.
-
 **Frames.** With `path: {frame: workpiece, segments: [...]}` or `path_frame`, the path is given in one of the `frames`.
 This applies to segments, files of points, directions, orientations and `path_start`. `frame: workpiece` places scene
 bodies and other frames in this frame. If the task space has only some of x, y, z, the frame may be rotated only within
@@ -243,10 +241,9 @@ path:
     orientation: {to: {rpy_deg: [0, 0, 45], profile: smooth}}
 ```
 
-Position and orientation advance together. With `profile: uniform` the tool turns by the same angle in every metre. If
-the next segment turns differently, the turning rate jumps; like a corner, such a jump is refused. Then use `profile:
-smooth` (the rate and its first two derivatives are zero at both ends) or a `blend`, which rounds position and
-orientation.
+With `profile: uniform` the tool turns by the same angle in every metre. If the next segment turns differently, the
+turning rate jumps. Then use `profile: smooth` (the rate and its first two derivatives are zero at both ends) or a
+`blend`, which rounds position and orientation.
 
 With `tangent` or `{tangent: {up: ...}}` the tool keeps its orientation in a frame with x along the tangent and y along
 up x tangent. The tool turns about `up` if the path turns, and pitches if the path rises. The angle between `up` and the
@@ -295,7 +292,7 @@ The segment starts at the first point; with `start: free` and no `path_start`, s
 more than 1e-4 m or rad) is refused, unless `relative: true` moves the points there.
 
 **Without a tolerance** the path passes through all points. Successive points with the same position are refused, unless
-the position never changes. Points so rounded or noisy that their curvature is only noise are also refused.
+the position never changes.
 
 **With a tolerance** the path is a quintic B-spline (C4) with few knots, even for 100,000 points. It passes through the
 first and last point, and may wind, cross itself or repeat itself. Repeated points are left out and reported. Spikes and

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import brachis
+from brachis.common.deadline import NEVER
+from brachis.common.progress import ignore
 from brachis.errors import PathError, TaskError
 from brachis.optimise.links import PostureLink
 from brachis.optimise.path_phase import PathPhase
@@ -18,7 +20,7 @@ from brachis.optimise.phase_timing import PhaseTiming
 from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import PlausibilityWarning
-from brachis.search.order import find_orders
+from brachis.search.chain import find_batches
 from brachis.task import scene_during
 from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
@@ -330,24 +332,38 @@ def test_slopes_of_the_program_over_the_path_agree_with_differences(linked):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_orders_are_the_best_of_all(seed):
-    """Against all permutations, with two nodes in every group."""
+def test_orders_are_the_best_of_all(slide, seed):
+    """Against all permutations of lines on a slide, and their known times."""
     rng = np.random.default_rng(seed)
-    groups = np.repeat(np.arange(5), 2)
-    prices = rng.uniform(1.0, 2.0, (10, 10))
-    first, last = rng.uniform(0.0, 1.0, (2, 10))
-    best = min(
-        first[way[0]]
-        + last[way[-1]]
-        + sum(prices[a, b] for a, b in itertools.pairwise(way))
-        for order in itertools.permutations(range(5))
-        for way in itertools.product(*(np.flatnonzero(groups == g) for g in order))
+    begins = rng.uniform(0.5, 3.0, 5).round(3)
+    ends = begins + rng.choice([-0.3, 0.3], 5)
+    seams = [
+        {"path": [{"line": {"to": [end]}}], "path_start": [begin], "name": f"{number}"}
+        for number, (begin, end) in enumerate(zip(begins, ends, strict=True))
+    ]
+    times = {}
+    for order in itertools.permutations(range(5)):
+        stops = [0.0, *np.column_stack([begins, ends])[list(order)].ravel(), 2.0]
+        times[order] = least_time(np.abs(np.diff(stops))).sum()
+    task = brachis.load_task(
+        {
+            "brachis": 1,
+            "robot": {"urdf": "slide"},
+            "start": {"joints": [0.0]},
+            "end": {"joints": [2.0]},
+            "program": seams,
+            "order": "free",
+            "task_space": ["x"],
+            "spline": {"rest": "velocity"},
+        }
     )
-    found = find_orders(prices, first, last, groups, 4)
-    price, way = found[0]
-    assert price == pytest.approx(best)
-    assert sorted(groups[way]) == [0, 1, 2, 3, 4]
-    assert [each for each, _ in found] == sorted(each for each, _ in found)
+    problem = bind_task(slide, task)
+    batch = next(find_batches(problem, (), NEVER, ignore))
+    sections = [
+        section for part in batch.guesses[0].problem.sections for section in part
+    ]
+    order = [int(section.name) for section in sections if section.kind == "path"]
+    assert times[tuple(order)] == pytest.approx(min(times.values()))
 
 
 def test_a_free_order_visits_seams_along_the_way():

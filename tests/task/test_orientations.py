@@ -246,7 +246,7 @@ WRONG_STARTS = [
         "null",
         "pose",
         (
-            r"path_start: the start posture is free, but the start of the path is missing.*allowed: \{position: \[x, "
+            r"path_start: the start posture is free, or .*which is missing.*allowed: \{position: \[x, "
             r"y, z\], ...\} with one of"
         ),
     ),

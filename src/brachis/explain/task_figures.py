@@ -288,10 +288,10 @@ def _blends(problem: Problem) -> Iterator[TaskFigure]:
     """List blends; blends of the same size share one figure, and so do all blends along the points of one file."""
     segments = problem.task.path
     breaks = problem.path.breaks.tolist()
-    places: dict[int | None, tuple[float, float]] = {}
-    for number, (before, span) in enumerate(pairwise(problem.path.spans), 1):
-        if span.segment is None:
-            places[before.segment] = (breaks[number], breaks[number + 1])
+    places: dict[int, tuple[float, float]] = {}
+    for ends, span in zip(pairwise(breaks), problem.path.spans, strict=True):
+        if len(span.segments) > 1:
+            places[span.segments[0]] = ends
     groups: defaultdict[str | float | None, list[int]] = defaultdict(list)
     source = ""
     for number, (segment, after) in enumerate(pairwise(segments)):

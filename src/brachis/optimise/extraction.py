@@ -106,7 +106,8 @@ def _time_sections(
             end = first + max(reached)
             if section.kind == "dwell":
                 end = begin + section.dwell
-            yield section, MotionPart(section.name, section.kind, begin, end)
+            travel = component.task.travel if section.kind == "path" else ""
+            yield section, MotionPart(section.name, section.kind, begin, end, travel)
             begin = end
 
 

@@ -210,7 +210,6 @@ def follow(
 def begin(
     phase: Phase,
     phase_timing: PhaseTiming,
-    timing: Timing,
     lost: float,
     intervals: int,
     points: int,
@@ -221,8 +220,6 @@ def begin(
     ----------
     phase, phase_timing, points
         See `follow`.
-    timing : Timing
-        Timing of the joint path.
     lost : float
         Fraction of the time that the intervals together may cost.
     intervals : int
@@ -233,6 +230,8 @@ def begin(
     phase : Phase
     x : (v,) ndarray
     """
+    timing = phase_timing.timing
+    assert timing is not None
     given = phase.with_grid(phase.grid, phase_timing.boundary)
     breaks = _knots(given, phase_timing, timing, lost, _FIRST_WAIT, intervals)
     motion = _lay_splines(given, phase_timing, timing, breaks).motion

@@ -102,8 +102,8 @@ class Phase:
         self.boundary = boundary
         self.pause = pause
         self.time_law = boundary.time_law
-        has_path = joint_map.path is not None
-        layout = layout or VariableLayout(grid, boundary, has_path=has_path)
+        if layout is None:
+            layout = VariableLayout(grid, boundary, has_path=joint_map.path is not None)
         self._layout = layout
         self.splines = layout.splines
         self.slices = layout.slices
@@ -324,10 +324,6 @@ class Phase:
         ]
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
-
-    def has(self, limit: Limit) -> bool:
-        """Tell whether a limit object is one of the phase's limits."""
-        return any(candidate is limit for candidate in self.limits)
 
     def rows_of(self, limit: Limit) -> np.ndarray:
         """Return the indices of the rows of one of the limits, (K, c); empty, (0, c), for a limit on means."""

@@ -323,7 +323,11 @@ class Program(PhaseSequence[Phase], Summary):
         # The rows of the links come last.
         pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(
-            [first + phase.rows_of(limit) for phase, first in pairs if phase.has(limit)]
+            [
+                first + phase.rows_of(limit)
+                for phase, first in pairs
+                if any(candidate is limit for candidate in phase.limits)
+            ]
         )
 
     @cached_property

@@ -196,7 +196,7 @@ def begin_with_timing(
         begun = phase, x_of_phase
         if phase.time_law is None:
             share = max(_FEWEST, int(intervals * phase_timing.t_end / total))
-            begun = begin(phase, phase_timing, phase_timing.timing, lost, share, points)
+            begun = begin(phase, phase_timing, lost, share, points)
         phases.append(begun[0])
         x_by_phase.append(begun[1])
     first = program.with_phases(phases)

@@ -294,8 +294,7 @@ def build_path(
         curves.append(curve)
     spans = _join(curves, segments, coordinates)
     positions = len(position_rows(coordinates.rows))
-    stopping = [i for i, segment in enumerate(segments) if segment.stop]
-    return path_type.of(spans, positions, frame, stopping)
+    return path_type.of(spans, positions, frame)
 
 
 def _line_to(
@@ -334,7 +333,9 @@ def _join(
     for join in find_joins(curves, coordinates.rows):
         i = join.index
         size = segments[i].blend or 0.0
-        spans.append(CurveSpan(join.first, taken, join.first.length - size, i))
+        dwell = segments[i].dwell if segments[i].stop else None
+        end = join.first.length - size
+        spans.append(CurveSpan(join.first, taken, end, (i,), dwell))
         taken = size
         if segments[i].stop:
             continue
@@ -342,8 +343,9 @@ def _join(
             corners.append(coordinates.corner(join))
         else:
             rounded = coordinates.blend(join, size)
-            spans.append(CurveSpan(rounded, 0.0, rounded.length))
-    spans.append(CurveSpan(curves[-1], taken, curves[-1].length, len(curves) - 1))
+            spans.append(CurveSpan(rounded, 0.0, rounded.length, (i, i + 1)))
+    last = len(curves) - 1
+    spans.append(CurveSpan(curves[last], taken, curves[last].length, (last,)))
     refuse_corners(corners)
     # If two blends meet in the middle of a segment, nothing is left of the segment except rounding errors.
     return tuple(span for span in spans if span.length > 1e-11 * span.curve.length)
@@ -383,6 +385,13 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
         name: task_map.value(task_map.robot.posture(joints, f"postures.{name}"))
         for name, joints in task.postures.items()
     }
+    known = (task_map.rows, frame, postures)
+    path = None
+    if task.begins_elsewhere:
+        assert point is not None
+        written = build_path(task.path, point, *known)
+        path = written.travelled(task.path_begin, is_reversed=task.path_reversed)
+        (point,) = path.sample([0.0]).target
     given_joints = task.joints_at("start")
     if given_joints is not None:
         start = task_map.robot.posture(*given_joints)
@@ -390,7 +399,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
             check_on_path(task_map, start, point, "start", given_joints[1])
         point = task_map.value(start)
     assert point is not None
-    return build_path(task.path, point, task_map.rows, frame, postures)
+    return path or build_path(task.path, point, *known)
 
 
 def check_on_path(

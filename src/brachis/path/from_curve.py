@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brachis.common.arrays import cut, greville
-from brachis.errors import InputError
+from brachis.errors import InputError, PathError
 from brachis.path.protocol import Array
 from brachis.path.sequence import Path
 from brachis.task import Segment, SpeedTable, Task
@@ -194,9 +194,9 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
     tables: list[Array] = []
     goes_on = False  # whether the last table applies up to the end of its segment
     for (begin, end), span in zip(pairwise(path.breaks), path.spans, strict=True):
-        if span.segment is None:
+        if len(span.segments) != 1:
             continue
-        segment = segments[span.segment]
+        segment = segments[span.segments[0]]
         speeds = getattr(segment.shape, "speeds", ())
         if getattr(segment, "speed", None):  # the segment has a process speed
             speeds = ()
@@ -218,6 +218,13 @@ def feed_tables(segments: Sequence[Segment], path: Path) -> tuple[SpeedTable, ..
 
 def with_feed_rates(task: Task, path: Path) -> Task:
     """Add the feed rates of the path's points to the tool limits of a task."""
+    shapes = [segment.shape for segment in task.path]
+    if task.begins_elsewhere and any(getattr(shape, "speeds", ()) for shape in shapes):
+        raise PathError(
+            "feed rates of points hold in the direction in which they are written",
+            where="path_reversed" if task.path_reversed else "path_begin",
+            allowed="a path without feed rates",
+        )
     tables = feed_tables(task.path, path)
     if not tables:
         return task

@@ -62,8 +62,7 @@ def legs_of(task: Task, task_map: TaskMap, path: Path) -> tuple[Leg, ...]:
         _check_task_space(task_map)
     for number, section in enumerate(sections):
         _check_motion(task_map, path, section, number)
-    waits = [segment.dwell for segment in task.path if segment.stop]
-    dwells = dict(zip(path.stops.tolist(), waits, strict=True))
+    dwells = path.dwells
     ends = sorted({0.0, 1.0, *dwells, *(s for section in sections for s in section.s)})
     speeds = {section.s: section.speed for section in sections}
     return tuple(
@@ -144,13 +143,11 @@ def _parts_of_segments(task: Task, path: Path) -> list[ProcessSpeed]:
     """
     speeds = [getattr(segment, "speed", None) for segment in task.path]
     sections: list[ProcessSpeed] = []
-    after = 0
     bounds = pairwise(path.breaks.tolist())
     for (begin, end), span in zip(bounds, path.spans, strict=True):
-        segment = after if span.segment is None else span.segment
-        after = segment + (span.segment is None)
+        segment = span.segments[0]
         speed = speeds[segment]
-        if speed is None or speed != speeds[after]:
+        if speed is None or speed != speeds[span.segments[-1]]:
             continue
         first = begin
         if sections and (sections[-1].s[1], sections[-1].speed) == (begin, speed):

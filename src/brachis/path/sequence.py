@@ -101,17 +101,27 @@ def arc_length(velocity: Callable[[Array], Array], knots: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class CurveSpan:
-    """The part of a curve between sigma = `first` and `last`, with the index of its segment (None for a blend)."""
+    """The part of a curve from sigma = `first` to `last`, which is below `first` if the curve is travelled backwards.
+
+    `segments` has the index of its segment or, for a blend, of the two segments that the blend joins. `dwell` is the
+    time for which the tool waits at the end, s; None if it does not stop there.
+    """
 
     curve: Curve
     first: float
     last: float
-    segment: int | None = None
+    segments: tuple[int, ...] = ()
+    dwell: float | None = None
 
     @property
     def length(self) -> float:
         """Range of sigma."""
-        return self.last - self.first
+        return abs(self.last - self.first)
+
+    @property
+    def direction(self) -> float:
+        """1.0, or -1.0 if the curve is travelled backwards."""
+        return -1.0 if self.last < self.first else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +141,6 @@ class Path:
         Number of position rows among the coordinates.
     frame : PathFrame or None
         Frame in which the curves are given; None means the world.
-    stops : ndarray
-        Values of s at which the tool stops; only there may the path have corners.
     """
 
     spans: tuple[CurveSpan, ...]
@@ -140,7 +148,6 @@ class Path:
     total: float
     positions: int
     frame: PathFrame | None
-    stops: Array
 
     @classmethod
     def of(
@@ -148,18 +155,65 @@ class Path:
         spans: tuple[CurveSpan, ...],
         positions: int,
         frame: PathFrame | None,
-        stopping: Sequence[int] = (),
     ) -> Self:
-        """Join spans whose first `positions` rows are those of the position.
-
-        The tool stops at the ends of the segments with the indices `stopping`.
-        """
+        """Join spans whose first `positions` rows are those of the position."""
         ends = sum_up([span.length for span in spans])
         total = float(ends[-1])
-        breaks = ends / total
-        last = {span.segment: end for span, end in zip(spans, breaks[1:], strict=True)}
-        stops = np.array([last[segment] for segment in stopping], dtype=float)
-        return cls(spans, breaks, total, positions, frame, stops)
+        return cls(spans, ends / total, total, positions, frame)
+
+    @property
+    def dwells(self) -> dict[float, float]:
+        """Values of s inside the path at which the tool stops, with the time for which it waits there, s.
+
+        Only there may the path have corners.
+        """
+        ends = zip(self.breaks[1:-1].tolist(), self.spans[:-1], strict=True)
+        return {s: span.dwell for s, span in ends if span.dwell is not None}
+
+    @property
+    def stops(self) -> Array:
+        """Values of s inside the path at which the tool stops."""
+        return np.array([*self.dwells], dtype=float)
+
+    def travelled(self, begin: float, *, is_reversed: bool) -> Self:
+        """Return the path as it is travelled from s = `begin` on, if it is closed, and backwards if it is reversed.
+
+        If the ends of a closed path meet in a corner, the tool stops there.
+
+        Raises
+        ------
+        PathError
+            The path is not closed, or the tool waits where it begins.
+        """
+        spans = self.spans
+        if begin:
+            ends = self.sample([0.0, 1.0])
+            gap = float(np.abs(ends.target[1] - ends.target[0]).max())
+            if gap > tolerances.COORDINATE:
+                raise PathError(
+                    "only a closed path can begin elsewhere",
+                    where="path_begin",
+                    found=f"ends {gap:.3g} m or rad apart",
+                    allowed="a path that ends where it begins, in all coordinates",
+                )
+            before = self.between(0.0, begin).spans
+            after = self.between(begin, 1.0).spans
+            if before[-1].dwell:
+                raise PathError(
+                    "the path begins where the tool waits",
+                    where="path_begin",
+                    found=begin,
+                    allowed="a place without a dwell",
+                )
+            meeting = replace(after[-1], dwell=None if _is_smooth(ends) else 0.0)
+            spans = (*after[:-1], meeting, *before)
+        if is_reversed:
+            dwells = [span.dwell for span in spans[-2::-1]]
+            spans = tuple(
+                replace(span, first=span.last, last=span.first, dwell=dwell)
+                for span, dwell in zip(spans[::-1], [*dwells, None], strict=True)
+            )
+        return self.of(spans, self.positions, self.frame)
 
     @cached_property
     def length(self) -> float:
@@ -173,7 +227,8 @@ class Path:
         """Values of s between which the path is analytic, from its start to its end, including the breaks."""
         inner_knots = [self.breaks]
         for (begin, end), span in zip(pairwise(self.breaks), self.spans, strict=True):
-            knots = begin + (span.curve.knots - span.first) / self.total
+            sigma = span.curve.knots - span.first
+            knots = begin + span.direction * sigma / self.total
             # The ends of a piece may be knots of its curve, up to rounding.
             is_inner = (knots > begin + tolerances.PATH) & (
                 knots < end - tolerances.PATH
@@ -195,11 +250,13 @@ class Path:
         spans = list(self.spans[first : last + 1])
         before = (begin - self.breaks[first]) * self.total
         after = (end - self.breaks[last + 1]) * self.total
-        spans[0] = replace(spans[0], first=spans[0].first + before)
-        spans[-1] = replace(spans[-1], last=spans[-1].last + after)
+        start = spans[0].first + spans[0].direction * before
+        spans[0] = replace(spans[0], first=start)
+        stop = spans[-1].last + spans[-1].direction * after
+        dwell = spans[-1].dwell if after > -tolerances.PATH * self.total else None
+        spans[-1] = replace(spans[-1], last=stop, dwell=dwell)
         breaks = np.concatenate([[begin], inside, [end]])
-        stops = self.stops[(self.stops > begin) & (self.stops < end)]
-        return replace(self, spans=tuple(spans), breaks=breaks, stops=stops)
+        return replace(self, spans=tuple(spans), breaks=breaks)
 
     def sample(self, s: Sequence[float] | Array) -> PathSample:
         """Return the path at K values of s, shape (K,).
@@ -231,8 +288,21 @@ class Path:
     def _on_span(self, i: int, s: Array, order: int) -> Array:
         """Return coordinates and derivatives with respect to sigma, (order + 1, K, m), on the curve of one piece."""
         span = self.spans[i]
-        sigma = span.first + (s - self.breaks[i]) * self.total
-        return span.curve.derivatives(sigma, order)
+        sigma = span.first + span.direction * (s - self.breaks[i]) * self.total
+        result = span.curve.derivatives(sigma, order)
+        if span.direction < 0.0:
+            result[1::2] *= -1.0
+        return result
+
+
+def _is_smooth(ends: PathSample) -> bool:
+    """Tell whether a closed path, sampled at both ends, closes without a jump of its first three derivatives."""
+    size = np.linalg.norm(ends.xi[0])
+    return all(
+        np.linalg.norm(derivative[1] - derivative[0])
+        <= tolerances.WRITTEN * max(size, np.linalg.norm(derivative))
+        for derivative in (ends.xi, ends.xi_ds, ends.xi_dds)
+    )
 
 
 def path_speed(task_map: TaskMap, path: Path, s: float) -> float:

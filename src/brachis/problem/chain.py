@@ -60,7 +60,6 @@ class ProblemChain(Problem):
         cls,
         whole: Problem,
         parts: Sequence[Problem],
-        waits: Sequence[float],
         sections: Sequence[Sequence[Section]],
         *,
         is_closed: bool,
@@ -72,21 +71,15 @@ class ProblemChain(Problem):
         whole : Problem
             The move from the start of the first part to the end of the last one, with the settings of the planner.
         parts : sequence of Problem
-        waits : sequence of float
-            Time for which the arm waits after each part, s.
         sections : sequence of sequence of Section
         is_closed : bool
         """
-        waiting = tuple(
-            replace(part, legs=(*part.legs[:-1], replace(part.legs[-1], dwell=wait)))
-            for part, wait in zip(parts, waits, strict=True)
-        )
         known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
-        known["legs"] = tuple(leg for part in waiting for leg in part.legs)
+        known["legs"] = tuple(leg for part in parts for leg in part.legs)
         known["time_laws"] = tuple(law for part in parts for law in part.time_laws)
         return cls(
             **known,
-            chained=waiting,
+            chained=tuple(parts),
             sections=tuple(map(tuple, sections)),
             is_closed=is_closed,
         )
@@ -107,17 +100,20 @@ class ProblemChain(Problem):
 
         In a free order, moves are named after the paths to which they lead.
         """
-        chained = tuple(self.chained[number] for number in numbers)
         sections = [self.sections[number] for number in numbers]
         for number, ((first, *_), (after, *_)) in enumerate(pairwise(sections)):
             if first.kind == "move" and self.task.order == "free":
                 sections[number] = (replace(first, name=f"to {after.name}"),)
+        chained = [self.chained[number] for number in numbers]
+        return replace(self, sections=tuple(sections)).with_parts(chained)
+
+    def with_parts(self, parts: Sequence[Problem]) -> ProblemChain:
+        """Return the chain with other parts, such as variants, in place of its own."""
         return replace(
             self,
-            chained=chained,
-            sections=tuple(sections),
-            legs=tuple(leg for part in chained for leg in part.legs),
-            time_laws=tuple(law for part in chained for law in part.time_laws),
+            chained=tuple(parts),
+            legs=tuple(leg for part in parts for leg in part.legs),
+            time_laws=tuple(law for part in parts for law in part.time_laws),
         )
 
     @property
@@ -137,8 +133,9 @@ class ProblemChain(Problem):
 
     def with_part(self, number: int, part: Problem) -> Problem:
         """Return the program with another part in place of the part with a number."""
-        parts = (*self.chained[:number], part, *self.chained[number + 1 :])
-        return replace(self, chained=parts)
+        return self.with_parts(
+            (*self.chained[:number], part, *self.chained[number + 1 :])
+        )
 
     def flies(self, number: int) -> bool:
         """Tell whether the arm passes from the part with a number to the next one without a stop."""

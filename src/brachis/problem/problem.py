@@ -67,6 +67,8 @@ class Problem(Summary):
         Limits that are not in the task, as the user gave them.
     beside : tuple of (E, n) ndarray or None
         Postures from which the arm comes, and postures to which it goes on, if they are known.
+    variants : tuple of Problem
+        The same path travelled otherwise, if the planner chooses how: backwards, or from another place on.
     """
 
     task: Task
@@ -80,6 +82,7 @@ class Problem(Summary):
     time_laws: tuple[TimeLaw | None, ...]
     own_limits: tuple[LimitModel, ...] = ()
     beside: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
+    variants: tuple[Problem, ...] = ()
 
     @classmethod
     def of(
@@ -130,8 +133,15 @@ class Problem(Summary):
         )
         limits = check_postures(task, task_map, limits, problem.given_postures, path)
         if end is not None and not task.boundary.periodic:
-            end = _on_path(task_map, end, path)
-        return replace(problem, limits=limits, end=end)
+            end = _on_path(task_map, end, path, 1.0)
+        if start is not None and task.begins_elsewhere:
+            start = _on_path(task_map, start, path, 0.0)
+        return replace(problem, limits=limits, start=start, end=end)
+
+    def waiting(self, wait: float) -> Problem:
+        """Return the problem with a wait at its end, s."""
+        last = replace(self.legs[-1], dwell=wait)
+        return replace(self, legs=(*self.legs[:-1], last))
 
     @property
     def is_chain(self) -> bool:
@@ -230,9 +240,11 @@ class Problem(Summary):
         return first, last
 
 
-def _on_path(task_map: TaskMap, posture: np.ndarray, path: Path) -> np.ndarray:
-    """Return the posture, (n,), at the end of the path that is closest to a given one, which may already be there."""
-    place = path.sample(np.ones(1)).target
+def _on_path(
+    task_map: TaskMap, posture: np.ndarray, path: Path, s: float
+) -> np.ndarray:
+    """Return the posture, (n,), at s on the path that is closest to a given one, which may already be there."""
+    place = path.sample([s]).target
     if not task_map.m:
         return posture
     if isinstance(task_map, JointSpace):

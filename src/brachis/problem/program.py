@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,8 @@ from brachis.task.segments import LineSegment, LineTo, SegmentModel
 from brachis.task.settings import Payload
 
 _PLACES = len(POSITION)
+_BEGINS = 8
+"""Number of places, evenly spaced, at which a closed path may begin if the planner chooses."""
 
 
 def bind_task(
@@ -86,7 +89,13 @@ def bind_task(
             end_speed=FREE if ends_flying else 0.0,
         )
         part_task = _task_of(stretch, changed, task, before, stated)
-        problem = Problem.of(changed, part_task, own_limits)
+        problem = Problem.of(changed, part_task, own_limits).waiting(stretch.wait)
+        tasks = _variants(stretch, part_task, problem.path)
+        variants = [
+            Problem.of(changed, variant, own_limits).waiting(stretch.wait)
+            for variant in tasks
+        ]
+        problem = replace(problem, variants=tuple(variants))
         if before is not None:
             _check_meet(before, problem, stretch)
         problems.append(problem)
@@ -101,8 +110,7 @@ def bind_task(
                 where=f"{stretch.key}, robot.limits.rms_torque",
                 allowed="no such limit; verify the motion of the program against it",
             )
-    waits = [stretch.wait for stretch in stretches]
-    return ProblemChain.of_parts(whole, problems, waits, sections, is_closed=is_closed)
+    return ProblemChain.of_parts(whole, problems, sections, is_closed=is_closed)
 
 
 @dataclass
@@ -254,9 +262,10 @@ def _task_of(
         changes["path_start"] = _end_of(before, changes)
     approaches = stretch.of(ApproachPart)
     retracts = stretch.of(RetractPart)
-    if (approaches or retracts) and _has_places(limited.tool_limits):
+    is_open = "free" in (limited.path_reversed, limited.path_begin)
+    if (approaches or retracts or is_open) and _has_places(changes["tool_limits"]):
         raise TaskError(
-            "with an approach or a retract, values of s are not those of the path alone",
+            "values of s are not those of the path alone with an approach, a retract or a travel that is free",
             where=f"{stretch.key}.tool_limits",
             allowed="speed in the segments of the path",
         )
@@ -278,6 +287,24 @@ def _task_of(
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
     return validate(Task, task.model_copy(update=changes), stretch.key)
+
+
+def _variants(stretch: _Stretch, task: Task, path: Path) -> Iterator[Task]:
+    """Yield the task of a stretch, given with its path, for every other way in which the path may be travelled."""
+    for part in stretch.of(PathPart):
+        turns = [part.path_reversed]
+        if part.path_reversed == "free":
+            turns = [False, True]
+        begins = [part.path_begin]
+        if part.path_begin == "free":
+            stops = [s for s, dwell in path.dwells.items() if not dwell]
+            places = np.append(
+                np.arange(_BEGINS) / _BEGINS, np.abs(float(turns[0]) - np.array(stops))
+            )
+            begins = np.unique(places.round(9)).tolist()
+        for begin, turn in list(product(begins, turns))[1:]:
+            keys = {"path_reversed": turn, "path_begin": begin}
+            yield task.model_copy(update=keys)
 
 
 def _check_meet(before: Problem, after: Problem, stretch: _Stretch) -> None:

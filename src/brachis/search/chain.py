@@ -6,9 +6,8 @@ the limits of the postures at which it ends. The best chains are improved as a w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,18 +23,17 @@ from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_ch
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
 from brachis.search.lattice import step_lengths
 from brachis.search.moves import move_guesses
-from brachis.search.order import find_orders
 from brachis.search.schedule import Batch, batches, has_charts
 from brachis.search.stages import ChainGuess, InitialGuess
 
 _SHARE = 0.4
 """Fraction of the remaining time in which the joint paths of all paths are sought."""
-_NODES = 8
-"""Number of joint paths of each path among which the best order is sought."""
+_NODES = 96
+"""Number of joint paths of all paths among which the best order is sought."""
 _TRIED = 6
 """Number of chains after which none is passable."""
-_BESIDE = 4
-"""Number of the best chains so far to whose ends joint paths of the next path should be close."""
+_FASTEST = 4
+"""Number of the fastest chains so far to whose ends joint paths of the next path should be close."""
 _AS_FAST = 1.1
 """Factor on the time of the best chain up to which other chains count as fast. Without it, a program of a UR10 took
 1.60 s in place of 1.31 s."""
@@ -51,29 +49,56 @@ most 0.1 % slower."""
 
 @dataclass(frozen=True, eq=False)
 class _Option:
-    """A joint path of a path, or the posture at the end of a move.
+    """A joint path of a part of a program, or a posture at which a move may begin or end.
 
     Attributes
     ----------
     ends : (2, n) ndarray
         Postures at both ends, without virtual joints.
+    number : int
+        Number of the part; -1 for a posture.
     time : float
         Time along the joint path, s.
     guess : InitialGuess or None
-        None for a posture.
+        None for a move, whose joint path is sought later, and for a posture.
     """
 
     ends: np.ndarray
+    number: int = -1
     time: float = 0.0
     guess: InitialGuess | None = None
+
+    @classmethod
+    def at(cls, posture: np.ndarray) -> _Option:
+        """Return a posture, (n,), as an option."""
+        return cls(np.array([posture, posture]))
 
 
 @dataclass(frozen=True, eq=False)
 class _Chain:
-    """Options for the first parts of a program, and the time of these parts, s."""
+    """Options for the first parts of a program, one for each part, with the postures that are given between them.
+
+    Attributes
+    ----------
+    options : tuple of _Option
+    time : float
+        Time of these parts, s.
+    """
 
     options: tuple[_Option, ...] = ()
     time: float = 0.0
+
+    @property
+    def parts(self) -> list[_Option]:
+        """The options of the parts, without postures."""
+        return [option for option in self.options if option.number >= 0]
+
+    def followed_by(self, *options: _Option) -> _Chain:
+        """Return the chain with further options."""
+        time = self.time
+        for option in options:
+            time += option.time
+        return _Chain((*self.options, *options), time)
 
 
 def find_batches(
@@ -113,171 +138,160 @@ class _ChainSearch:
     level: SearchLevel
     deadline: Deadline
     listener: Listener
-
-    @property
-    def _level_of_moves(self) -> SearchLevel:
-        """Level at which joint paths of moves round obstacles are sought."""
-        return replace(self.level, in_charts=1)
+    prices: dict[tuple[_Option, _Option], float] = field(default_factory=dict)
+    """Least times of moves from option to option, s."""
 
     def best_guesses(self) -> list[ChainGuess]:
         """Return guesses of the whole program, the fastest first."""
-        if self.problem.task.order == "free":
-            return self._guesses_in_any_order()
-        parts = self.problem.parts
         start = self.problem.start
-        first = 0
-        if start is not None:
-            chains = [_Chain((_Option(np.array([start, start])),))]
-        elif self.problem.is_closed or parts[0].task_map.m:
-            # A motion that closes may be searched from any path on.
-            first = next(i for i, part in enumerate(parts) if part.task_map.m)
-            chains = [_Chain()]
-        else:
-            raise TaskError(
-                "nothing determines the posture in which the program begins",
-                where="start",
-                found="free, before a move",
-                allowed="a posture; or end: start, for a motion that closes",
-            )
-        order = [*range(first, len(parts)), *range(first)]
-        chains = self._extend(chains, order)
-        chains = sorted(chains, key=lambda chain: chain.time)
-        return self._passable(partial(self.guess_of, order=order), chains)
+        begun = _Chain(() if start is None else (_Option.at(start),))
+        is_free = self.problem.task.order == "free"
+        visit = self._visit_in_any_order if is_free else self._visit_in_order
+        return self._passable(sorted(visit(begun), key=lambda chain: chain.time))
 
-    def _passable(
-        self, guess_of: Callable[[_Chain], ChainGuess], chains: Sequence[_Chain]
-    ) -> list[ChainGuess]:
+    def _passable(self, chains: Sequence[_Chain]) -> list[ChainGuess]:
         """Return the guesses of the best distinct chains whose moves get round what is in their way."""
         paths = sum(bool(part.task_map.m) for part in self.problem.parts)
         count = max(1, self.level.in_charts * _PATHS // max(paths, _PATHS))
-        found: list[ChainGuess] = []
+        guesses: list[ChainGuess] = []
         blocked: list[PathError] = []
         chosen: list[np.ndarray] = []
         for chain in chains:
-            if len(found) == count or (len(blocked) == _TRIED and not found):
+            if len(guesses) == count or (len(blocked) == _TRIED and not guesses):
                 break
             ends = np.array([option.ends for option in chain.options])
             if any(np.abs(ends - other).max() < _APART for other in chosen):
                 continue
             chosen.append(ends)
             try:
-                found.append(guess_of(chain))
+                guesses.append(self._guess_of(chain))
             except PathError as error:
                 blocked.append(error)
-        if not found:
+        if not guesses:
             raise blocked[0]
-        return found
+        return guesses
 
-    def _guesses_in_any_order(self) -> list[ChainGuess]:
-        """Return guesses of the whole program in the best orders of its paths, the fastest first."""
+    def _guess_of(self, chain: _Chain) -> ChainGuess:
+        """Return the guess of a chain; raise PathError if no move gets round what is in its way."""
         problem = self.problem
-        parts = problem.parts
-        paths = [number for number, part in enumerate(parts) if part.task_map.m]
-        move = next(part for part in parts if not part.task_map.m)
-        nodes: list[tuple[int, _Option]] = []
-        beside = []
-        if problem.start is not None:
-            beside.append(_Chain((_Option(np.array([problem.start] * 2)),)))
-        for number in paths:
-            options = self._options(number, beside)
-            prices = [option.time for option in options]
-            if beside:
-                ends = np.array([option.ends[0] for option in options])
-                home = [
-                    price_moves(move, ends, chain.options[-1].ends[-1])
-                    for chain in beside
-                ]
-                prices = np.min(home, axis=0) + prices
-            chosen = [options[i] for i in np.argsort(prices, kind="stable")[:_NODES]]
-            nodes += [(number, option) for option in chosen]
-            beside = beside or [_Chain((option,)) for option in chosen]
-        groups = np.array([paths.index(number) for number, _ in nodes])
-        times = np.array([option.time for _, option in nodes])
-        begins = np.array([option.ends[0] for _, option in nodes])
-        ends = np.array([option.ends[1] for _, option in nodes])
-        prices = (
-            np.array([price_moves(move, ends, begin) for begin in begins]).T + times
-        )
-        zeros = np.zeros(len(nodes))
-        if problem.is_closed:
-            found = []
-            for root in np.flatnonzero(groups == 0):
-                first = np.where(np.arange(len(nodes)) == root, times, np.inf)
-                back = price_moves(move, ends, begins[root])
-                found += find_orders(prices, first, back, groups, _KEPT)
+        options = chain.parts
+        if problem.task.order == "free":
+            problem = problem.only([option.number for option in options])
         else:
-            start, end = problem.start, problem.end
-            first = times + (
-                zeros if start is None else price_moves(move, begins, start)
-            )
-            last = zeros if end is None else price_moves(move, ends, end)
-            found = find_orders(prices, first, last, groups, _KEPT)
-        found.sort(key=lambda way: way[0])
-        chains = [
-            _Chain(tuple(nodes[node][1] for node in way), time) for time, way in found
-        ]
-        orders = {
-            id(chain): [nodes[node][0] for node in way]
-            for chain, (_, way) in zip(chains, found, strict=True)
-        }
-        return self._passable(
-            lambda chain: self._guess_in_order(chain, orders[id(chain)]), chains
-        )
+            options.sort(key=lambda option: option.number)
+        guesses = []
+        level = replace(self.level, in_charts=1)
+        for option, part in zip(options, problem.parts, strict=True):
+            guess = option.guess
+            if guess is None:
+                start, end = option.ends
+                move = replace(part, start=start, end=end)
+                guess = move_guesses(move, level, self.deadline, self.listener)[0]
+                guess = replace(guess, problem=part)
+            guesses.append(guess)
+        problem = problem.with_parts([guess.problem for guess in guesses])
+        return ChainGuess.of_parts(problem, guesses, chain.time)
 
-    def _guess_in_order(self, chain: _Chain, visited: Sequence[int]) -> ChainGuess:
-        """Return the guess of the program with its paths, given by their numbers, in an order."""
-        problem = self.problem
-        paths = iter(visited)
-        order = [
-            next(paths) if part.task_map.m else number
-            for number, part in enumerate(problem.parts)
-        ]
-        options = list(chain.options)
-        if problem.start is not None:
-            options.insert(0, _Option(np.array([problem.start] * 2)))
-        if problem.end is not None:
-            options.append(_Option(np.array([problem.end] * 2)))
-        elif problem.is_closed:
-            options.append(_Option(options[0].ends[[0, 0]]))
-        search = replace(self, problem=problem.only(order))
-        return search.guess_of(_Chain(tuple(options), chain.time), range(len(order)))
+    def _visit_in_order(self, begun: _Chain) -> list[_Chain]:
+        """Return chains of all parts in their order."""
+        parts = self.problem.parts
+        first = 0
+        if not begun.options:
+            if not (self.problem.is_closed or parts[0].task_map.m):
+                raise TaskError(
+                    "nothing determines the posture in which the program begins",
+                    where="start",
+                    found="free, before a move",
+                    allowed="a posture; or end: start, for a motion that closes",
+                )
+            # A motion that closes may be searched from any path on.
+            first = next(i for i, part in enumerate(parts) if part.task_map.m)
+        chains = [begun]
+        numbers = iter([*range(first, len(parts)), *range(first)])
+        for number in numbers:
+            if parts[number].task_map.m:
+                chains = self._go_through(chains, number)
+                continue
+            path = None if parts[number].end is not None else next(numbers, None)
+            if path is None:
+                chains = self._move_to_posture(chains, number)
+            else:
+                chains = self._move(chains, number, self._options(path, chains))
+        return chains
 
-    def _extend(self, chains: list[_Chain], order: Sequence[int]) -> list[_Chain]:
-        """Continue chains with parts, given by their numbers."""
-        if not order:
-            return chains
-        number, *others = order
-        part = self.problem.parts[number]
-        if part.task_map.m:
-            return self._extend(self._through(chains, number), others)
-        if part.end is not None:
-            goal = _Option(np.array([part.end, part.end]))
-            return self._extend(self._move(chains, part, [goal]), others)
-        if others:
-            options = self._options(others[0], chains)
-            return self._extend(self._move(chains, part, options), others[1:])
-        # The last move leads to where the motion began.
-        closed = []
-        for chain in chains:
-            goal = _Option(chain.options[0].ends[[0, 0]])
-            closed += self._move([chain], part, [goal])
-        return closed
+    def _visit_in_any_order(self, begun: _Chain) -> list[_Chain]:
+        """Return the fastest chains through all paths, exactly, by dynamic programming over sets of visited paths.
+
+        M. Held and R. M. Karp, A dynamic programming approach to sequencing problems, Journal of the Society for
+        Industrial and Applied Mathematics 10(1), 1962. Of each path one of several options is visited.
+        """
+        parts = self.problem.parts
+        paths = [number for number, part in enumerate(parts) if part.task_map.m]
+        options = self._options_of_all(paths, begun)
+        begins = [[begun.followed_by(option) for option in some] for some in options]
+        if begun.options:
+            roots = [{0: [begun]}]
+        elif self.problem.is_closed:
+            roots = [{1: [chain]} for chain in begins[0]]
+        else:
+            roots = [{1 << place: chains for place, chains in enumerate(begins)}]
+        complete: list[_Chain] = []
+        for visited_by in roots:
+            for visited in range((1 << len(paths)) - 1):
+                chains = visited_by.pop(visited, [])
+                for place, some in enumerate(options):
+                    if chains and not visited >> place & 1:
+                        number = len(chains[0].parts)
+                        more = self._move(chains, number, some, 1)
+                        visited_by.setdefault(visited | 1 << place, []).extend(more)
+            chains = visited_by.popitem()[1]
+            if not parts[-1].task_map.m:
+                chains = self._move_to_posture(chains, len(parts) - 1)
+            complete += chains
+        return complete
+
+    def _options_of_all(
+        self, paths: Sequence[int], begun: _Chain
+    ) -> list[list[_Option]]:
+        """Return the best options for each of several paths, close to the start or to the options of the first path."""
+        nearby = [begun] if begun.options else []
+        options_of_all = []
+        for number in paths:
+            options = self._options(number, nearby)
+            prices = []
+            for option in options:
+                moves = (self._price(number - 1, chain, option) for chain in nearby)
+                prices.append(min(moves, default=0.0) + option.time)
+            # The best joint path of every variant comes first: which is best depends on the order.
+            order = np.argsort(prices, kind="stable")
+            guesses = [options[i].guess for i in order]
+            variants = [id(guess and guess.problem) for guess in guesses]
+            ranks = [
+                variants[:place].count(variant)
+                for place, variant in enumerate(variants)
+            ]
+            order = order[np.argsort(ranks, kind="stable")]
+            chosen = order[: _NODES // len(paths)]
+            options_of_all.append([options[i] for i in chosen])
+            nearby = nearby or [
+                begun.followed_by(option) for option in options_of_all[0]
+            ]
+        return options_of_all
 
     def _name_of(self, number: int) -> str:
         """Return the name of the path of a problem, whose approach comes before it."""
         sections = self.problem.sections[number]
         return next(section.name for section in sections if section.kind == "path")
 
-    def _through(self, chains: list[_Chain], number: int) -> list[_Chain]:
+    def _go_through(self, chains: list[_Chain], number: int) -> list[_Chain]:
         """Continue the best chains with a path that begins where they end."""
         longer = []
-        for chain in sorted(chains, key=lambda chain: chain.time)[:_BESIDE]:
+        for chain in sorted(chains, key=lambda chain: chain.time)[:_FASTEST]:
             start = None
             if chain.options:
                 start = self._end_on_path(chain.options[-1], number)
-            for option in self._options(number, [chain], start):
-                time = chain.time + option.time
-                longer.append(_Chain((*chain.options, option), time))
+            options = self._options(number, [chain], start)
+            longer += [chain.followed_by(option) for option in options]
         return longer
 
     def _end_on_path(self, option: _Option, number: int) -> np.ndarray:
@@ -296,19 +310,43 @@ class _ChainSearch:
         return posture
 
     def _move(
-        self, chains: list[_Chain], part: Problem, options: Sequence[_Option]
+        self,
+        chains: Sequence[_Chain],
+        number: int,
+        goals: Sequence[_Option],
+        kept: int = _KEPT,
     ) -> list[_Chain]:
-        """Continue chains with a move to each option; keep the fastest chains to each."""
-        begins = np.array([chain.options[-1].ends[-1] for chain in chains])
+        """Continue chains with a move to each goal and with the goal; keep the fastest chains to each."""
         longer = []
-        for option in options:
-            prices = price_moves(part, begins, option.ends[0])
-            times = prices + [chain.time for chain in chains]
-            for best in np.argsort(times, kind="stable")[:_KEPT]:
+        for goal in goals:
+            prices = [self._price(number, chain, goal) for chain in chains]
+            times = np.array(prices) + [chain.time for chain in chains]
+            for best in np.argsort(times, kind="stable")[:kept]:
                 chain = chains[best]
-                time = float(times[best]) + option.time
-                longer.append(_Chain((*chain.options, option), time))
+                ends = np.array([chain.options[-1].ends[-1], goal.ends[0]])
+                move = _Option(ends, number, prices[best])
+                longer.append(chain.followed_by(move, goal))
         return longer
+
+    def _move_to_posture(self, chains: Sequence[_Chain], number: int) -> list[_Chain]:
+        """Continue chains with a move to the posture that the program gives, or else to where the motion began."""
+        end = self.problem.parts[number].end
+        if end is not None:
+            return self._move(chains, number, [_Option.at(end)])
+        closed = []
+        for chain in chains:
+            goal = _Option.at(chain.options[0].ends[0])
+            closed += self._move([chain], number, [goal])
+        return closed
+
+    def _price(self, number: int, chain: _Chain, goal: _Option) -> float:
+        """Return the least time of a move from the end of a chain, s; all moves between two options are the same."""
+        pair = (chain.options[-1], goal)
+        if pair not in self.prices:
+            part = self.problem.parts[number]
+            ends = pair[0].ends[-1], goal.ends[0]
+            self.prices[pair] = price_move(part, *ends)
+        return self.prices[pair]
 
     def _options(
         self,
@@ -323,13 +361,12 @@ class _ChainSearch:
         part = self.problem.parts[number]
         name = self._name_of(number)
         self.listener(f"looking for joint paths of {name}")
-        best = sorted(chains, key=lambda chain: chain.time)[:_BESIDE]
+        fastest = sorted(chains, key=lambda chain: chain.time)[:_FASTEST]
         # A slow chain whose end happens to be close to a posture would count as much as the fastest one.
-        longest = _AS_FAST * best[0].time if best else 0.0
         before = [
             chain.options[-1].ends[-1]
-            for chain in best
-            if chain.options and chain.time <= longest
+            for chain in fastest
+            if chain.options and chain.time <= _AS_FAST * fastest[0].time
         ]
         after = None
         if number + 1 < len(self.problem.parts):
@@ -338,19 +375,29 @@ class _ChainSearch:
             np.unique(before, axis=0) if before else None,
             None if after is None else after[None],
         )
-        changed = replace(
-            part, beside=beside, start=part.start if start is None else start
-        )
-        try:
-            guesses = self._guesses(changed)
-        except BrachisError as error:
-            error.where = ": ".join(filter(None, (f"program: {name}", error.where)))
-            raise
+        guesses: list[InitialGuess] = []
+        errors: list[BrachisError] = []
+        deadline = self.deadline.part(1.0 / len(self.problem.parts))
+        for variant in (part, *part.variants):
+            if guesses and deadline.passed:
+                break
+            first = variant.start if start is None else start
+            changed = replace(variant, beside=beside, start=first)
+            try:
+                of_variant = self._guesses(changed)
+            except BrachisError as error:
+                error.where = ": ".join(filter(None, (f"program: {name}", error.where)))
+                errors.append(error)
+                continue
+            guesses += [replace(guess, problem=variant) for guess in of_variant]
+        if not guesses:
+            raise errors[0]
         return [
             _Option(
                 guess.postures_at(np.array([0.0, 1.0]))[:, : self.problem.robot.n],
+                number,
                 guess.estimate,
-                replace(guess, problem=part),
+                guess,
             )
             for guess in guesses
         ]
@@ -360,10 +407,10 @@ class _ChainSearch:
         own = Decompositions(part, self.families)
         dead_ends: dict[str, DeadEnd] = {}
         if has_charts(part, own):
-            found = joint_paths_in_charts(part, own, self.level, self.deadline)
-            if not isinstance(found, DeadEnd):
-                return found
-            dead_ends[ALL_POSTURES] = found
+            guesses = joint_paths_in_charts(part, own, self.level, self.deadline)
+            if not isinstance(guesses, DeadEnd):
+                return guesses
+            dead_ends[ALL_POSTURES] = guesses
         reason = None
         for batch in batches(part, own, self.deadline, self.listener):
             if batch.guesses:
@@ -377,41 +424,19 @@ class _ChainSearch:
                     raise reason
         raise explain_no_motion(part, own, (), dead_ends, self.deadline)
 
-    def guess_of(self, chain: _Chain, order: Sequence[int]) -> ChainGuess:
-        """Return the guess of a chain; raise PathError if no move gets round what is in its way."""
-        options = list(chain.options)
-        guesses: dict[int, InitialGuess] = {}
-        here = None if self.problem.start is None else options.pop(0).ends[-1]
-        for number in order:
-            part = self.problem.parts[number]
-            option = options[0]
-            if part.task_map.m:
-                assert option.guess is not None
-                guesses[number] = option.guess
-            else:
-                assert here is not None
-                move = replace(part, start=here, end=option.ends[0])
-                known = (self._level_of_moves, self.deadline, self.listener)
-                guess = move_guesses(move, *known)[0]
-                guesses[number] = replace(guess, problem=part)
-            if part.task_map.m or option.guess is None:
-                options.pop(0)
-            here = option.ends[-1] if part.task_map.m else option.ends[0]
-        in_order = [guesses[number] for number in sorted(guesses)]
-        return ChainGuess.of_parts(self.problem, in_order, chain.time)
 
-
-def price_moves(part: Problem, begins: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Estimate the least times, (K,), s, of moves from postures, (K, n), to a posture, (n,).
+def price_move(part: Problem, begin: np.ndarray, end: np.ndarray) -> float:
+    """Estimate the least time, s, of a move from a posture to another, (n,) each.
 
     With limits on accelerations and torques at the average posture, a straight joint line takes 2 sqrt(A), and with
     limits on velocities B + A / B if it reaches them; see `step_lengths` for A and B.
     """
-    middle = 0.5 * (begins + end)
-    lengths = step_lengths(part.limits, middle, end - begins, np.arange(len(begins)))
-    by_acceleration, by_velocity = lengths
-    slow = np.sqrt(by_acceleration) < by_velocity
-    fraction = np.divide(
-        by_acceleration, by_velocity, where=slow, out=np.zeros_like(begins[:, 0])
+    middle = 0.5 * (begin + end)
+    step = end - begin
+    lengths = step_lengths(
+        part.limits, middle[None], step[None], np.zeros(1, dtype=int)
     )
-    return np.where(slow, by_velocity + fraction, 2.0 * np.sqrt(by_acceleration))
+    (by_acceleration,), (by_velocity,) = lengths
+    if np.sqrt(by_acceleration) < by_velocity:
+        return float(by_velocity + by_acceleration / by_velocity)
+    return float(2.0 * np.sqrt(by_acceleration))

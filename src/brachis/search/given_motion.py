@@ -128,8 +128,8 @@ def _given_chain_guess(
     motions = [component for _, component in motion.components]
     if len(motions) != len(parts):
         raise UnreachableError("it has not the parts of this program")
-    if problem.task.order == "free":
-        raise UnreachableError("the order of the parts is free")
+    if problem.task.order == "free" or any(part.variants for part in parts):
+        raise UnreachableError("the order of the parts, or their travel, is free")
     of_paths = {
         number: given_guess(part, Decompositions(part, families), known, origin)
         for number, (part, known) in enumerate(zip(parts, motions, strict=True))

@@ -71,6 +71,8 @@ class TaskKeywords(RobotKeywords, total=False):
     frames: Mapping[str, Placement | Settings | Transform]
     postures: Mapping[str, Array | Sequence[float] | Mapping[str, float]]
     path_frame: str | None
+    path_reversed: bool
+    path_begin: float
     path_start: (
         Array | Sequence[float] | Mapping[str, Any] | ToolPose | Transform | None
     )

@@ -303,7 +303,8 @@ def _with_start(task: Task, source: str) -> Task:
     TaskError
         Neither the task nor the segment states the start, and the start posture is free.
     """
-    if task.start != "free" or task.path_start is not None:
+    is_needed = task.start == "free" or task.begins_elsewhere
+    if not is_needed or task.path_start is not None:
         return task
     place = task.start_place
     changes: dict[str, object] = {"path_start": place}

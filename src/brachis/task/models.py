@@ -34,6 +34,7 @@ from brachis.task.orientation import StartPlace, ToolPose
 from brachis.task.paths import (
     FreePosture,
     JointValues,
+    PathBegin,
     PathStart,
     Posture,
     RedundantJoints,
@@ -79,8 +80,10 @@ _CHOICES = {
     "branch": "auto",
     "search.guesses": "lattice",
     "margins.singularity": None,
+    "path_reversed": False,
+    "path_begin": 0.0,
 }
-"""Keys that choose postures along a path of the tool, and their defaults."""
+"""Keys that choose postures along a path of the tool, or where it begins, and their defaults."""
 _OF_PATHS = {
     "path": (),
     "path_start": None,
@@ -145,6 +148,11 @@ class Task(CheckedModel):
     """Named joint positions, rad (m), in chain order or by joint, for start, end and line: {to_posture: NAME}."""
     path_frame: Name | None = None
     """Frame in which path and path_start are given. Null: the world."""
+    path_reversed: Flag = False
+    """Whether the tool travels the path backwards, in the same poses. start is then at the end of the path."""
+    path_begin: PathBegin = 0.0
+    """Fraction of a closed path at which the tool begins. It stops where the ends of the path meet in a corner. Values
+    of s are along the path as travelled."""
     boundary: BoundarySettings = Field(default_factory=BoundarySettings)
     """Speeds at both ends, or a periodic motion."""
     tool_limits: ToolLimits = Field(default_factory=ToolLimits)
@@ -303,7 +311,9 @@ class Task(CheckedModel):
         is_free = self.start == "free"
         has_path_start = self.path_start is not None
         is_pose = isinstance(self.path_start, ToolPose)
-        if is_free and not (has_path_start or is_unread) and self.start_place is None:
+        is_stated = has_path_start or is_unread or self.start_place is not None
+        is_needed = is_free or (self.begins_elsewhere and self.task_space != "joints")
+        if is_needed and not is_stated:
             if self.task_space == "joints":
                 yield (
                     "start",
@@ -312,7 +322,7 @@ class Task(CheckedModel):
                 )
             yield (
                 "path_start",
-                "the start posture is free, but the start of the path is missing",
+                "the start posture is free, or not at the start of the path, which is missing",
                 self._start_forms,
             )
         if is_free and self.search.guesses == "numeric":
@@ -357,7 +367,7 @@ class Task(CheckedModel):
                 "a joint path cannot be in a frame",
                 "null, with task_space: joints",
             )
-        yield from self._changed(_CHOICES, "a joint path leaves no choice of postures")
+        yield from self._changed(_CHOICES, "a joint path leaves no choice")
 
     def _changed(self, defaults: Mapping[str, object], why: str) -> Iterator[Mistake]:
         """Refuse keys, given by their defaults, that this task space does not have."""
@@ -435,6 +445,18 @@ class Task(CheckedModel):
         """Whether the path prescribes the orientation of the tool or of its axis."""
         space = self.task_space
         return space in {"pose", "pose_free_roll"} or "axis" in space
+
+    @property
+    def begins_elsewhere(self) -> bool:
+        """Whether the tool begins the path elsewhere than the path is written to begin."""
+        return self.path_reversed or self.path_begin > 0.0
+
+    @property
+    def travel(self) -> str:
+        """Say how the path is travelled, if not as it is written: where it begins, and whether it is reversed."""
+        begin = f"from s = {self.path_begin:.3g}" if self.path_begin else ""
+        turn = "reversed" if self.path_reversed else ""
+        return ", ".join(filter(None, (begin, turn)))
 
     @property
     def start_place(self) -> StartPlace:

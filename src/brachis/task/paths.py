@@ -54,6 +54,9 @@ RedundantJoints = Annotated[
 ]
 
 
+PathBegin = Annotated[Number, Field(ge=0.0, lt=1.0)]
+
+
 Segments = Annotated[tuple[Segment, ...], Field(min_length=1, max_length=3000)]
 
 

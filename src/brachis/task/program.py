@@ -25,6 +25,7 @@ from brachis.task.fields import (
 from brachis.task.limit_models import LimitSpec, ToolLimits
 from brachis.task.messages import validate
 from brachis.task.paths import (
+    PathBegin,
     PathStart,
     Posture,
     RedundantJoints,
@@ -95,6 +96,12 @@ class PathPart(LimitedPart):
     """As path_start of a task. Null: the first waypoint, or the end of the part before."""
     path_frame: Name | None = None
     """As path_frame of a task."""
+    path_reversed: Literal[False, True, "free"] = False
+    """As path_reversed of a task. free: the planner chooses."""
+    path_begin: Annotated[
+        Literal["free"] | PathBegin, ByForm("free, or a number from 0 to below 1")
+    ] = 0.0
+    """As path_begin of a task. free: the planner chooses one of eight places, or of the stops of the path."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """As tolerances of a task."""
     redundant_joints: RedundantJoints = "auto"
@@ -224,17 +231,20 @@ def scene_during(
 
 
 def path_keys(part: PathPart) -> dict[str, Any]:
-    """Return the keys of a task for the path of a part."""
+    """Return the keys of a task for the path of a part; what is free is as the path is written."""
     keys = (
         "path",
         "task_space",
         "path_start",
         "path_frame",
+        "path_reversed",
+        "path_begin",
         "tolerances",
         "redundant_joints",
         "branch",
     )
-    return {key: getattr(part, key) for key in keys}
+    values = {key: getattr(part, key) for key in keys}
+    return {key: value for key, value in values.items() if value != "free"}
 
 
 def with_task_space(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -275,6 +285,7 @@ def find_mistakes(
         yield from _find_mistakes_if_free(parts)
         return
     yield from _find_wrong_order(parts)
+    yield from _find_wrong_start(parts)
     yield from _find_wrong_flights(parts, is_closed=end == "start")
     ways = [part for part in parts if part.kind in WAYS]
     if ways and isinstance(ways[-1], MovePart):
@@ -348,6 +359,15 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a retract leads away from a path",
                 "a path before it, and a move or nothing after it",
             )
+        begins_elsewhere = isinstance(part, PathPart) and (
+            part.path_reversed or part.path_begin
+        )
+        if begins_elsewhere and not {before, after} <= {"move", None}:
+            yield (
+                f"{key}.path_reversed",
+                "a path that begins elsewhere than it is written lies between moves",
+                "a move or nothing on both sides",
+            )
         if isinstance(part, PathPart) and part.task_space in (None, "free"):
             yield (
                 f"{key}.task_space",
@@ -364,7 +384,11 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
             earlier = parts[numbers[numbers.index(number) - 1]]
             if getattr(earlier, "move", None) == part.move:
                 yield f"{key}.move", "the arm is in this posture", "another posture"
-    if parts and not kinds:
+
+
+def _find_wrong_start(parts: Sequence[Part]) -> Iterator[Mistake]:
+    """Yield the mistakes of a program that does not begin with a motion."""
+    if parts and not any(part.kind in WAYS for part in parts):
         yield "program", "nothing moves", "at least one path or move"
     elif parts and parts[0].kind == "dwell":
         yield "program[0]", "the arm waits before it has moved", "a path or move first"

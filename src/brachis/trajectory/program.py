@@ -23,12 +23,15 @@ class MotionPart:
         ``path``, ``move``, ``approach``, ``retract`` or ``dwell``.
     begin, end : float
         Times, s.
+    travel : str
+        How the planner chose to travel a path, if not as it is written: where it begins, and whether it is reversed.
     """
 
     name: str
     kind: str
     begin: float
     end: float
+    travel: str = ""
 
     @property
     def duration(self) -> float:
@@ -80,7 +83,8 @@ def part_rows(parts: Sequence[MotionPart]) -> list[tuple[str, ...]]:
     for part in parts:
         time = f"{part.duration:.4f} s ({part.begin:.4f} to {part.end:.4f} s)"
         share = f"{100.0 * part.duration / parts[-1].end:.1f} %"
-        rows.append((part.name, part.kind, time, share))
+        kind = ", ".join(filter(None, (part.kind, part.travel)))
+        rows.append((part.name, kind, time, share))
     return rows
 
 
@@ -97,7 +101,10 @@ def summarise_program(
 ) -> dict[str, str]:
     """Return the names of the parts, and the events, for the summary of a motion."""
     shown = {
-        "parts": ", ".join(part.name for part in parts),
+        "parts": ", ".join(
+            f"{part.name} ({part.travel})" if part.travel else part.name
+            for part in parts
+        ),
         "events": ", ".join(map(str, events)),
     }
     return {name: text for name, text in shown.items() if text}

@@ -73,12 +73,13 @@ _BROKEN = (
 
 
 class _StoredPart(Model, strict=True):
-    """Name, kind and times, s, of a part of a program."""
+    """Name, kind, times, s, and travel of a part of a program."""
 
     name: str
     kind: str
     begin: float
     end: float
+    travel: str = ""
 
 
 class _StoredEvent(Model, strict=True):

@@ -159,9 +159,9 @@ def print_run(report: RunReport | ProgramReport, *, json: bool) -> int:
 def print_segments(path: ToolPath) -> None:
     """Print, for a tool path of several segments, s and the distance from the path's start where each segment ends."""
     ends = {
-        span.segment: f"path[{span.segment}] at s = {s:.4g} ({1e3 * path.between(0.0, s).length:.4g} mm)"
+        span.segments: f"path[{span.segments[0]}] at s = {s:.4g} ({1e3 * path.between(0.0, s).length:.4g} mm)"
         for span, s in zip(path.spans, path.breaks[1:], strict=True)
-        if span.segment is not None and path.positions
+        if len(span.segments) == 1 and path.positions
     }
     if len(ends) > 1:
         print_lines(f"ends of the segments: {', '.join(ends.values())}")
