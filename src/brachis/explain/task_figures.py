@@ -206,10 +206,15 @@ def _with_conditions_of(before: Boundary, after: Boundary) -> Boundary:
     for side in ("start", "end"):
         pairs = zip(getattr(before, side), getattr(after, side), strict=True)
         sides[side] = tuple(
-            replace(new, derivatives=max(new.derivatives, old.derivatives, key=len))
+            replace(new, derivatives=max(new.derivatives, old.derivatives, key=_order))
             for old, new in pairs
         )
     return replace(after, **sides)
+
+
+def _order(derivatives: np.ndarray) -> tuple[int, bool]:
+    """Return a key by which more derivatives, and given ones, come later."""
+    return len(derivatives), bool(np.isfinite(derivatives).all())
 
 
 def _carry_over(phase: Phase, x: np.ndarray, target: Phase) -> np.ndarray:

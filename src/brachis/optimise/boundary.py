@@ -335,24 +335,27 @@ class Boundary:
         start, end = (np.isnan(side[0].derivatives).any() for side in sides)
         return bool(start), bool(end)
 
-    def with_speeds(self, derivatives: np.ndarray | None = None) -> Boundary:
-        """Return the conditions with given derivatives where speeds are free; at rest by default.
+    def with_speeds(self, orders: np.ndarray | None = None) -> Boundary:
+        """Return the conditions with given values and derivatives where speeds are free; at rest by default.
 
         Parameters
         ----------
-        derivatives : (2, 2 or more, c) ndarray, optional
-            First, second, ... derivatives of the curves at the start and at the end, per second.
+        orders : (2, 3 or more, c) ndarray, optional
+            Values, first, second, ... derivatives of the curves at the start and at the end, per second.
         """
         if not any(self.are_speeds_free):
             return self
-        if derivatives is None:
-            derivatives = np.zeros((2, ORDERS, len(self.start)))
+        if orders is None:
+            orders = np.zeros((2, 1 + ORDERS, len(self.start)))
+            orders[:, 0] = [
+                [end.value for end in side] for side in (self.start, self.end)
+            ]
         sides = []
         for side, given, is_free in zip(
-            (self.start, self.end), derivatives, self.are_speeds_free, strict=True
+            (self.start, self.end), orders, self.are_speeds_free, strict=True
         ):
             changed = [
-                replace(condition, derivatives=of_curve[: len(condition.derivatives)])
+                EndCondition(of_curve[0], of_curve[1 : 1 + len(condition.derivatives)])
                 for condition, of_curve in zip(side, given.T, strict=True)
             ]
             sides.append(tuple(changed) if is_free else side)

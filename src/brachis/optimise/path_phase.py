@@ -248,24 +248,26 @@ class PathPhase:
 
     def boundary_at(self, x: np.ndarray, factor: float) -> Boundary:
         """Return the conditions at both ends, with all free speeds smaller than at x by a factor."""
-        (_, y_ds, y_dds), square, u = self._evaluate(x)[0]
+        (y, y_ds, y_dds), square, u = self._evaluate(x)[0]
         ydot = factor * y_ds * np.sqrt(square)
         yddot = factor**2 * (y_dds * square + y_ds * u)
-        derivatives = np.array([ydot, yddot])[:, [0, -1]].swapaxes(0, 1)
-        return self.phase.boundary.with_speeds(derivatives)
+        orders = np.array([y, ydot, yddot])[:, [0, -1]].swapaxes(0, 1)
+        return self.phase.boundary.with_speeds(orders)
 
     def with_end(self, x: np.ndarray, end: int, orders: np.ndarray) -> np.ndarray:
-        """Return x of a move with given joint positions and time derivatives, (1 + k, n), at one end."""
-        (_, _, _), square, u = self._evaluate(x)[0]
-        rate = np.sqrt(square[end])
-        values = orders.copy()
-        if len(values) > 1:
-            values[1] /= rate
-        if len(values) > 2:
-            values[2] = (values[2] - values[1] * u[end]) / square[end]
+        """Return x with given joint positions at one end and, for a move, their time derivatives, (1 + k, n or more)."""
+        _, square, u = self._evaluate(x)[0]
+        q = orders[0, : self.joint_map.robot.n]
+        values = [self.joint_map.coordinates(self.ends[end], q)[1:]]
+        if len(orders) > 1:
+            values.append(orders[1] / np.sqrt(square[end]))
+        if len(orders) > 2:
+            values.append((orders[2] - values[1] * u[end]) / square[end])
         points = self._split(x)[1]
         motion = Motion(1.0, self._knots, _DEGREE, points)
-        points = motion.with_end(end, values, range(self.curves_count)).control_points
+        points = motion.with_end(
+            end, np.array(values), range(self.curves_count)
+        ).control_points
         return np.concatenate([x[: len(self._s)], points.ravel()])
 
     def places_at(self, end: int) -> np.ndarray:

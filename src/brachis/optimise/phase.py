@@ -125,14 +125,13 @@ class Phase:
 
     def with_grid(self, grid: FixedGrid, boundary: Boundary | None = None) -> Phase:
         """Return the same phase over another grid, with new boundary conditions if any are given."""
-        splines = None
-        if boundary is None and grid.knots is self.grid.knots:
-            splines = self.splines
+        is_same = boundary is None and grid.knots is self.grid.knots
+        splines = self.splines if is_same else None
         boundary = boundary or self.boundary
         has_path = self.joint_map.path is not None
         layout = VariableLayout(grid, boundary, has_path=has_path, splines=splines)
-        arguments = (self.joint_map, self.limits, grid, boundary)
-        return Phase(*arguments, margin=None, pause=self.pause, layout=layout)
+        known = (self.joint_map, self.limits, grid, boundary)
+        return Phase(*known, margin=None, pause=self.pause, layout=layout)
 
     def with_points(self, t_norm: np.ndarray) -> Phase:
         """Return the same phase with new collocation points `t_norm`. The knots and the meaning of x are unchanged."""

@@ -86,7 +86,7 @@ class PhaseTiming:
         count = max(least, -(-PLACES // phase.intervals))
         t = spread(motion.breaks / motion.t_end, count) * motion.t_end
         at_ends = np.array(motion.at(t[[0, -1]])).swapaxes(0, 1)
-        boundary = phase.boundary.with_speeds(at_ends[:, 1:])
+        boundary = phase.boundary.with_speeds(at_ends)
 
         def lay(t: np.ndarray) -> PhaseTiming:
             """Time the joint path at stations given by times, (P,)."""
