@@ -255,7 +255,7 @@ class PathPhase:
         return self.phase.boundary.with_speeds(orders)
 
     def with_end(self, x: np.ndarray, end: int, orders: np.ndarray) -> np.ndarray:
-        """Return x with given joint positions at one end and, for a move, their time derivatives, (1 + k, n or more)."""
+        """Return x with given joint positions at an end and, for a move, their time derivatives, (1 + k, n or more)."""
         _, square, u = self._evaluate(x)[0]
         q = orders[0, : self.joint_map.robot.n]
         values = [self.joint_map.coordinates(self.ends[end], q)[1:]]
