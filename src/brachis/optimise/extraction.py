@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
 from brachis.problem.chain import ProblemChain, Section
 from brachis.problem.problem import Problem
+from brachis.robot import Robot
 from brachis.task import Task
 from brachis.trajectory import (
     CONTINUOUS_TORQUE,
@@ -140,18 +142,35 @@ def _compose(
         if wait > 0.0:
             splines.append(splines[-1].wait(wait))
             nodes.append(_stand_still(nodes[-1], wait))
+    first = components[0][1]
+    return _assemble(
+        splines,
+        nodes,
+        task=problem.task,
+        robot=robot,
+        own_limits=first.own_limits,
+        components=tuple(components),
+    )
+
+
+def _assemble(
+    splines: Sequence[PhaseSpline], nodes: Sequence[Nodes], robot: Robot, **facts: Any
+) -> Trajectory:
+    """Join the splines and nodes of successive phases to a trajectory."""
     joined = join_nodes(nodes)
     knots, control_points = join_splines(splines)
     # Sums of durations differ from the times of the nodes by rounding.
     phase_ends = np.cumsum([spline.t_end for spline in splines])
     nearest = np.abs(joined.times[:, None] - phase_ends).argmin(axis=0)
-    first = components[0][1]
+    in_coordinates = {
+        "redundant_joints": (),
+        "branch": "",
+        "chart_rows": np.empty((0, 0, 0)),
+        "chart_knots": np.empty(0),
+    }
     return Trajectory(
-        task=problem.task,
-        urdf=first.urdf,
         robot=robot,
-        redundant_joints=(),
-        branch="",
+        urdf=robot.urdf,
         times=joined.times,
         q=joined.q,
         qdot=joined.qdot,
@@ -161,10 +180,7 @@ def _compose(
         degree=splines[0].degree,
         control_points=control_points,
         phase_ends=joined.times[nearest],
-        chart_rows=np.empty((0, 0, 0)),
-        chart_knots=np.empty(0),
-        own_limits=first.own_limits,
-        components=tuple(components),
+        **in_coordinates | facts,
     )
 
 
@@ -186,38 +202,25 @@ def make_trajectory(
         if before is not None and before.pause:
             sections.append(before.wait())
         sections.append(_Section.of(phase, motion, before))
-    splines = [section.spline for section in sections]
-    knots, control_points = join_splines(splines)
     joint_map = phases[0].joint_map
-    rows = np.empty((0, 0, 0))
-    chart_knots = np.empty(0)
+    facts: dict[str, Any] = {}
     if isinstance(joint_map, ChartMap):
-        rows = joint_map.rows.coefficients
-        chart_knots = joint_map.rows.knots
-    nodes = join_nodes([section.nodes for section in sections])
+        facts["chart_rows"] = joint_map.rows.coefficients
+        facts["chart_knots"] = joint_map.rows.knots
     own_limits = tuple(
         limit.name
         for limit in phases[0].limits
         if limit.origin.startswith("own_limits")
     )
-    return Trajectory(
+    return _assemble(
+        [section.spline for section in sections],
+        [section.nodes for section in sections],
         task=task,
-        urdf=joint_map.robot.urdf,
         robot=joint_map.robot,
         redundant_joints=joint_map.redundant_joints,
         branch=joint_map.branch_label,
-        times=nodes.times,
-        q=nodes.q,
-        qdot=nodes.qdot,
-        qddot=nodes.qddot,
-        qddot_before=nodes.qddot_before,
-        knots=knots,
-        degree=splines[0].degree,
-        control_points=control_points,
-        phase_ends=np.cumsum([section.nodes.times[-1] for section in sections]),
-        chart_rows=rows,
-        chart_knots=chart_knots,
         own_limits=own_limits,
+        **facts,
     )
 
 
