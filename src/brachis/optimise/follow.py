@@ -24,7 +24,13 @@ from brachis.optimise.grid import FixedGrid
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
-from brachis.optimise.timed_splines import breaks_for, even_out, splines_along
+from brachis.optimise.timed_splines import (
+    breaks_for,
+    even_out,
+    move_breaks,
+    splines_along,
+    third_points,
+)
 from brachis.timing import Timing
 from brachis.timing.joint_path import halfway
 
@@ -246,9 +252,10 @@ def _knots(
     shortest: float,
     max_intervals: int = _MOST_INTERVALS + 1,
 ) -> np.ndarray:
-    """Choose knots, (N + 1,), with `breaks_for`. If accelerations vanish at an end, shorten the end intervals."""
+    """Choose knots, (N + 1,), with `breaks_for`. If accelerations are given at an end, shorten the end intervals."""
     breaks = breaks_for(phase_timing.course, timing, lost, max_intervals)
-    if max(_vanishing(phase)) > 0:
+    ends = phase.boundary.start, phase.boundary.end
+    if any(len(end[-1].given) > 1 for end in ends):
         breaks = even_out(np.union1d(breaks, [shortest, 1.0 - shortest]))
     return breaks
 
@@ -275,8 +282,11 @@ def _lay_splines(
     moved = before + np.concatenate([ahead - before, breaks, 1.0 + behind])
     delays = (before * timing.t_end, (moved[-1] - before - 1.0) * timing.t_end)
     knots = clamped_knots(phase.degree, moved / moved[-1])
-    motion = splines_along(phase_timing.course, timing, knots, phase.degree, delays)
     splines = phase.boundary.splines(knots, phase.degree)
+    third = third_points(phase.boundary, splines, timing.t_end + sum(delays))
+    motion = splines_along(
+        phase_timing.course, timing, knots, phase.degree, delays, third
+    )
     t_end = motion.t_end
     points = [
         spline.control_points(spline.free_from(nearly, t_end), t_end)
@@ -464,17 +474,10 @@ def _hold_limits(
         next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:
             return best
-        breaks = _move(breaks, timing, next_timing)
+        breaks = move_breaks(breaks, timing, next_timing)
         timing = next_timing
         laid = _lay_splines(phase, phase_timing, timing, breaks)
     return replace(best, slower=best.needed_time / fastest.t_end - 1.0)
-
-
-def _move(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
-    """Move knots, (N + 1,), to the times at which a new timing passes the same places."""
-    places = np.interp(breaks, before.times / before.t_end, before.path.p)
-    moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
-    return np.concatenate([[0.0], moved[1:-1], [1.0]])
 
 
 def _between_stations(

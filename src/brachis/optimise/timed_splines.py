@@ -8,12 +8,15 @@ more than its curve does close by.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from brachis import kernel
 from brachis.common.arrays import greville
 from brachis.kernel import Spline, collocation
+from brachis.optimise.boundary import Boundary, BoundarySpline
 from brachis.optimise.bspline import clamped_knots
 from brachis.optimise.motion import Motion
 from brachis.timing import TimedCourse, Timing
@@ -98,6 +101,13 @@ def even_out(breaks: np.ndarray) -> np.ndarray:
         breaks = np.sort(np.append(breaks, middles[is_long]))
 
 
+def move_breaks(breaks: np.ndarray, before: Timing, timing: Timing) -> np.ndarray:
+    """Move knots, (N + 1,), to the times at which a new timing passes the same places."""
+    places = np.interp(breaks, before.times / before.t_end, before.path.p)
+    moved = np.interp(places, timing.path.p, timing.times / timing.t_end)
+    return np.concatenate([[0.0], moved[1:-1], [1.0]])
+
+
 def control_points_along(
     course: TimedCourse,
     timing: Timing,
@@ -153,14 +163,32 @@ def _sharpen(
     return sharpened
 
 
+def third_points(
+    boundary: Boundary, splines: Sequence[BoundarySpline], t_end: float
+) -> np.ndarray:
+    """Return the third control points from both ends, (2, c), where accelerations in motion are given; else NaN."""
+    ends = boundary.start, boundary.end
+    third = np.full((2, len(splines)), np.nan)
+    for curve, spline in enumerate(splines):
+        points = spline.fixed_points(t_end)
+        for number, (end, place) in enumerate(zip(ends, (2, -3), strict=True)):
+            if end[0].rate and len(end[curve].given) > 1:
+                third[number, curve] = points[place]
+    return third
+
+
 def splines_along(
     course: TimedCourse,
     timing: Timing,
     knots: np.ndarray,
     degree: int,
     delays: tuple[float, float],
+    third: np.ndarray,
 ) -> Motion:
-    """Lay splines along a timing; see `control_points_along`."""
+    """Lay splines along a timing; see `control_points_along`.
+
+    `third` are the third control points from the start and the end, (2, c), where accelerations are given; else NaN.
+    """
     t_end = timing.t_end + sum(delays)
     points = control_points_along(course, timing, knots, degree, delays)
     places = greville(knots, degree)
@@ -172,6 +200,13 @@ def splines_along(
     for _ in range(2):
         reached = Motion(t_end, knots, degree, points).at(anchors * t_end)[0]
         points = points + _smoothly(anchors, targets - reached, places).T
+    # A given acceleration changes the speed a little. So do all rates beyond, so that no acceleration overshoots there.
+    for targets, second, ahead in ((third[0], 1, 1.0), (third[1], -2, -1.0)):
+        next_point = second + int(ahead)
+        step = places[next_point] - places[second]
+        slope = np.nan_to_num(targets - points[:, next_point]) / step
+        beyond = ahead * (ahead * (places - places[second])).clip(min=0.0)
+        points = points + slope[:, None] * beyond * (1.0 - np.abs(beyond)) ** 2
     return Motion(t_end, knots, degree, points)
 
 
