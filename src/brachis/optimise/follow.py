@@ -25,9 +25,11 @@ from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.timed_splines import (
+    between_stations,
     breaks_for,
     even_out,
     move_breaks,
+    raise_to,
     splines_along,
     third_points,
 )
@@ -404,7 +406,7 @@ class _Violations:
         for rows, state in laid.states(self._phase.joint_map, t):
             for limit, violations in self.by_limit.items():
                 values = limit.violation(limit.values(state))
-                _raise_to(violations, interval[rows], values)
+                raise_to(violations, interval[rows], values)
 
     def _find_changes(self, timing: Timing) -> np.ndarray:
         """Tell for each interval, (N,), whether the timing has changed close to it since it was last checked."""
@@ -469,7 +471,7 @@ def _hold_limits(
             break
         least = _MORE if narrower else 1.0
         for limit, amount in violations.find_excess(least):
-            added = _between_stations(amount, breaks, timing)
+            added = between_stations(amount, breaks, timing)
             narrower[limit] = narrower.get(limit, 0.0) + added
         next_timing = phase_timing.course.solve(phase_timing.rates, narrower)
         if next_timing is None:
@@ -478,26 +480,3 @@ def _hold_limits(
         timing = next_timing
         laid = _lay_splines(phase, phase_timing, timing, breaks)
     return replace(best, slower=best.needed_time / fastest.t_end - 1.0)
-
-
-def _between_stations(
-    values: np.ndarray, breaks: np.ndarray, timing: Timing
-) -> np.ndarray:
-    """Return bounds between stations, (P - 1, c), from lines that lie above the values of knot intervals, (N, c)."""
-    padded = np.concatenate([values[:1], values, values[-1:]])
-    at_breaks = np.maximum(padded[1:], padded[:-1])
-    t = timing.times / timing.t_end
-    first, fraction = locate(breaks, t)
-    share = fraction[:, None]
-    lines = (1.0 - share) * at_breaks[first] + share * at_breaks[first + 1]
-    between = np.maximum(lines[1:], lines[:-1])
-    station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(between) - 1)
-    _raise_to(between, station, at_breaks)
-    return between
-
-
-def _raise_to(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
-    """Raise rows of a table, (R, c), to the largest of their values, (K, c). The row numbers, (K,), ascend."""
-    first = np.flatnonzero(np.diff(rows, prepend=-1))
-    largest = np.maximum.reduceat(values, first)
-    table[rows[first]] = np.maximum(table[rows[first]], largest)

@@ -17,7 +17,7 @@ from brachis import kernel
 from brachis.common.arrays import greville
 from brachis.kernel import Spline, collocation
 from brachis.optimise.boundary import Boundary, BoundarySpline
-from brachis.optimise.bspline import clamped_knots
+from brachis.optimise.bspline import clamped_knots, locate
 from brachis.optimise.motion import Motion
 from brachis.timing import TimedCourse, Timing
 from brachis.timing.joint_path import halfway
@@ -161,6 +161,29 @@ def _sharpen(
     sharpened = means.copy()
     sharpened[1:-1] -= beside[1:-1, None] * np.where(is_smooth, smallest, 0.0)
     return sharpened
+
+
+def between_stations(
+    values: np.ndarray, breaks: np.ndarray, timing: Timing
+) -> np.ndarray:
+    """Return bounds between stations, (P - 1, c), from lines that lie above the values of knot intervals, (N, c)."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    at_breaks = np.maximum(padded[1:], padded[:-1])
+    t = timing.times / timing.t_end
+    first, fraction = locate(breaks, t)
+    share = fraction[:, None]
+    lines = (1.0 - share) * at_breaks[first] + share * at_breaks[first + 1]
+    between = np.maximum(lines[1:], lines[:-1])
+    station = (np.searchsorted(t, breaks, side="right") - 1).clip(0, len(between) - 1)
+    raise_to(between, station, at_breaks)
+    return between
+
+
+def raise_to(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+    """Raise rows of a table, (R, c), to the largest of their values, (K, c). The row numbers, (K,), ascend."""
+    first = np.flatnonzero(np.diff(rows, prepend=-1))
+    largest = np.maximum.reduceat(values, first)
+    table[rows[first]] = np.maximum(table[rows[first]], largest)
 
 
 def third_points(
