@@ -17,10 +17,12 @@ from brachis.optimise.links import PostureLink
 from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PhaseTiming
+from brachis.optimise.transcription import program_of
 from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.chain import find_batches
+from brachis.search.phase_plane import initial_guess
 from brachis.task import scene_during
 from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
@@ -269,27 +271,27 @@ def test_bodies_are_there_between_their_parts():
         brachis.plan("iiwa14", **CYCLE, scene=[{**ball, "until": "nowhere"}])
 
 
-@pytest.fixture(scope="module")
-def linked():
-    """A chain of a move, a seam and a move, with its program, and guesses of all its parts."""
-    task = brachis.load_task({"brachis": 1, "robot": {"urdf": "iiwa14"}, **in_full()})
+@pytest.fixture(scope="module", params=[False, True], ids=["stops", "flies"])
+def linked(request):
+    """A chain of a move, a seam and a move, with its program and a point of it."""
+    program = [
+        {"move": "next", "fly": request.param},
+        {**SEAM, "fly": request.param},
+        {"move": {"joints": HOME}},
+    ]
+    keys = {**CYCLE, "start": {"joints": HOME}, "program": program}
+    task = brachis.load_task({"brachis": 1, "robot": {"urdf": "iiwa14"}, **keys})
     problem = bind_task(robot_for(None, task.robot), task)
-    result = brachis.plan(task, **QUICK)
-    return problem, result.candidate.refined
-
-
-def in_full():
-    program = [{"move": "next"}, SEAM, {"move": {"joints": HOME}}]
-    return {**CYCLE, "start": {"joints": HOME}, "program": program}
+    (guess, *_) = next(find_batches(problem, [], NEVER, ignore)).guesses
+    program = program_of(guess.problem, guess.maps_by_leg())
+    return problem, program, initial_guess(program, guess)
 
 
 def test_slopes_of_links_agree_with_differences(linked):
-    _, solved = linked
-    program = solved.program
+    _, program, x = linked
     links = [link for link in program.links if isinstance(link, PostureLink)]
     assert len(links) == 2
     rng = np.random.default_rng(3)
-    x = solved.x
     direction = rng.normal(size=len(x)) * (program.x_lower < program.x_upper)
     step = 1e-6 * direction
     for link in links:
@@ -304,15 +306,13 @@ def test_slopes_of_links_agree_with_differences(linked):
 
 
 def test_slopes_of_the_program_over_the_path_agree_with_differences(linked):
-    problem, solved = linked
+    problem, program, x = linked
     phases = []
-    for phase, motion in zip(
-        solved.program.phases, solved.program.motions(solved.x), strict=True
-    ):
+    for phase, motion in zip(program.phases, program.motions(x), strict=True):
         curves = motion.at(np.linspace(0.0, motion.t_end, 201))[0]
         timing = PhaseTiming.through(phase, curves, 200)
         phases.append(PathPhase(phase, timing, 4, 14))
-    over_path = PathProgram(phases, solved.program.links)
+    over_path = PathProgram(phases, program.links)
     x = over_path.start
     dense = np.zeros((len(over_path.lower), len(x)))
     places = (over_path.jacobian_rows, over_path.jacobian_columns)
@@ -321,7 +321,7 @@ def test_slopes_of_the_program_over_the_path_agree_with_differences(linked):
     direction = rng.normal(size=len(x)) * (over_path.x_lower < over_path.x_upper)
     step = 1e-6 * direction
     change = over_path.rows(x + step) - over_path.rows(x - step)
-    count = sum(link.width for link in solved.program.links)
+    count = sum(link.size for link in program.links)
     linked_rows = slice(len(change) - count, None)
     np.testing.assert_allclose(
         (dense @ direction)[linked_rows], 0.5e6 * change[linked_rows], atol=1e-6

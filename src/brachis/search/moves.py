@@ -1,4 +1,4 @@
-"""Joint paths of moves, which prescribe only the postures at both ends."""
+"""Joint paths and estimated times of moves, which prescribe only the postures at both ends."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from brachis.kinematics import CHART, ChartRows, chart_around
 from brachis.problem.problem import Problem
 from brachis.search.guesses import SCREENED, SearchLevel
 from brachis.search.holding import explain_postures
+from brachis.search.lattice import step_lengths
 from brachis.search.phase_plane import least_time
 from brachis.search.sampled_paths import FreeSpace, sample_joint_path
 from brachis.search.screening import screen_coarsely
@@ -106,3 +107,20 @@ def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:
     estimate = least_time(problem, stations, postures)
     curves = chart.curves(stations, postures)
     return InitialGuess(problem, chart, curves, estimate, origin, CHART)
+
+
+def price_move(part: Problem, begin: np.ndarray, end: np.ndarray) -> float:
+    """Estimate the least time, s, of a move from a posture to another, (n,) each.
+
+    With limits on accelerations and torques at the average posture, a straight joint line takes 2 sqrt(A), and with
+    limits on velocities B + A / B if it reaches them; see `step_lengths` for A and B.
+    """
+    middle = 0.5 * (begin + end)
+    step = end - begin
+    lengths = step_lengths(
+        part.limits, middle[None], step[None], np.zeros(1, dtype=int)
+    )
+    (by_acceleration,), (by_velocity,) = lengths
+    if np.sqrt(by_acceleration) < by_velocity:
+        return float(by_velocity + by_acceleration / by_velocity)
+    return float(2.0 * np.sqrt(by_acceleration))

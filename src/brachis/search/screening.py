@@ -175,7 +175,7 @@ def improve_quickly(
     for_large = solver_for_large(problem.task.solver.name)
     session = SolverSession(backend, options, deadline, for_large=for_large)
     try:
-        program = program_of(problem, guess.maps_by_leg())
+        program = program_of(problem, guess.maps_by_leg()).at_rest()
         better = improve_guess(guess, program, session, effort, charts)
     except UnreachableError:
         return guess
