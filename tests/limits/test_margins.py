@@ -74,5 +74,5 @@ def test_a_path_of_joints_has_no_singular_postures():
         "path": [[0.0, 0.0], [1.0, 0.5]],
         "margins": {"singularity": 0.1},
     }
-    with pytest.raises(TaskError, match="no choice of postures"):
+    with pytest.raises(TaskError, match="leaves no choice"):
         load_task(task)

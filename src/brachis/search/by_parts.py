@@ -1,9 +1,8 @@
 """The end of a program's search part by part, where the arm stops between the parts.
 
 Once the program over the path has found the postures in which the arm stops, the parts between two stops can be
-finished by themselves. A program over time of all parts would be large: for two seams with approaches and given speeds
-it has a thousand variables, and was not solved within a minute. For three seams without given speeds it was solved, but
-the motion part by part was 0.7 % faster.
+finished by themselves. A program over time of all parts, which is needed for given speeds and limits of third order,
+would be large: for two seams with approaches it has a thousand variables, and was not solved within a minute.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ from brachis.optimise.mesh import adapt_mesh
 from brachis.optimise.refine import RefinementOptions
 from brachis.optimise.retiming import FINE, improve_joint_paths, is_timing_all
 from brachis.optimise.transcription import program_of
-from brachis.search.by_parts import Finish, finish_by_parts
+from brachis.search.by_parts import finish_by_parts
 from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
@@ -122,18 +122,17 @@ def finish_candidate(
     settings = candidate.problem.task.refinement
     options = RefinementOptions.of(settings, deadline)
     program = candidate.program
-    finish_part = partial(
-        finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
-    )
     is_divided = len(candidate.problem.flights) > 1
     if is_divided and not (is_timing_all(program) or program.means):
+        finish_part = partial(
+            finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
+        )
         return finish_by_parts(candidate, finish_part)
     is_followed = follows_timing(candidate.guess, candidate.program)
     is_short = is_followed and deadline.left < LITTLE_TIME
     share = _IF_SHORT if is_short else _BEFORE_REFINEMENT
     session = _open_session(candidate.guess, deadline.part(share), listener)
-    follow = partial(_finish_over_path, finish_part=finish_part)
-    finish = follow if is_followed else _finish_over_time
+    finish = _finish_over_path if is_followed else _finish_over_time
     try:
         outcome = finish(candidate, session, options, to_beat)
         is_slow = not outcome.is_settled or outcome.t_end > candidate.estimate
@@ -195,12 +194,11 @@ def _finish_over_path(
     session: SolverSession,
     options: RefinementOptions,
     to_beat: Marks,
-    finish_part: Finish,
 ) -> Candidate:
     """Improve joint paths further over the path, then over time, and follow the faster of the two timings.
 
     The joint path that the program over time improves is kept. The time that its knots cost is regained by splines that
-    are laid along the timing. Parts between which the arm stops are improved one by one.
+    are laid along the timing.
     """
     guess = candidate.guess
     program = candidate.program
@@ -211,13 +209,6 @@ def _finish_over_path(
     if program.flies:
         paths = improve_joint_paths(program, paths.curves, session, tolerance, FINE)
         reports = (*reports, *paths.reports)
-    # A part cannot mend the postures in which it begins and ends.
-    elif len(guess.problem.flights) > 1 and paths.violation <= options.tolerance:
-        better = guess.with_legs(paths.curves, paths.t_end)
-        improved = replace(candidate, guess=better, reports=reports)
-        outcome = finish_by_parts(improved, finish_part)
-        if outcome.is_settled:
-            return outcome
     session = shorten_solves(session)
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
