@@ -116,6 +116,17 @@ def test_no_flight_is_slower_than_stopping():
     assert times[1] < 0.99 * times[0]
 
 
+def test_a_piece_of_a_cycle_in_motion_does_not_close(slide):
+    program = [to(0.3, fly=True), line(0.2, 0.3, fly=True), to(0.0, fly=True)]
+    keys = {"start": {"joints": [0.0]}, "end": "start", "task_space": ["x"]}
+    task = brachis.load_task(
+        {"brachis": 1, "robot": {"urdf": "slide"}, **keys, "program": program}
+    )
+    problem = bind_task(slide, task)
+    assert [join[:2] for join in problem.joins] == [(0, 1), (1, 2), (2, 0)]
+    assert [join[:2] for join in problem.piece([0, 1]).joins] == [(0, 1)]
+
+
 def test_a_saved_flight_is_verified_again(slide, tmp_path):
     result = plan_slide(slide, [to(0.3, fly=True), to(0.0, fly=True)], end="start")
     result.save(tmp_path / "cycle.npz")

@@ -35,8 +35,8 @@ class EndCondition:
     value : float
         Value at the end; NaN if the value is free.
     derivatives : (k,) ndarray
-        The first k time derivatives, per second; empty if the derivatives are free. They are NaN if they are free and
-        the speed of the motion too.
+        The first k time derivatives, per second; empty if they are free. They are NaN at an end at which the planner
+        also chooses the speed of the motion.
     """
 
     value: float

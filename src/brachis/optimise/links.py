@@ -37,7 +37,7 @@ class LinkedPhase(Protocol):
         """Return the duration of the last interval, s, and its relative slopes, (z,), by the variables at the end."""
 
 
-PhasePoints = Sequence[tuple[LinkedPhase, np.ndarray]]
+LinkedPoints = Sequence[tuple[LinkedPhase, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Link(ABC):
         duration, _ = phase.last_interval(x)
         return duration ** np.array(self.orders)[:, None]
 
-    def rows(self, phase_points: PhasePoints) -> np.ndarray:
+    def rows(self, phase_points: LinkedPoints) -> np.ndarray:
         """Compute the values of the rows, by order and value. `phase_points` are all phases with their variables."""
         last = self._values(*phase_points[self.before], -1)
         first = self._values(*phase_points[self.after], 0)
@@ -103,7 +103,7 @@ class Link(ABC):
         rows = np.repeat(np.arange(self.size), len(columns))
         return rows, np.tile(columns, self.size)
 
-    def jacobian(self, phase_points: PhasePoints) -> np.ndarray:
+    def jacobian(self, phase_points: LinkedPoints) -> np.ndarray:
         """Compute the entries of the Jacobian on the pattern, (nnz,)."""
         orders = np.array(self.orders)
         phase, x = phase_points[self.before]

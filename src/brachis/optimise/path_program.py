@@ -14,7 +14,8 @@ from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import PhaseSequence
 
 _SLOWER = (1.0, 0.99, 0.97, 0.9, 0.7)
-"""Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing."""
+"""Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing. A solution
+meets the limits only at its stations; on programs of three seams, 0.97 was enough."""
 
 
 class PathProgram(PhaseSequence[PathPhase]):
@@ -149,7 +150,8 @@ class PathProgram(PhaseSequence[PathPhase]):
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases again with `PhaseTiming.along`."""
-        for factor in _SLOWER:
+        flies = any(any(phase.phase.boundary.are_speeds_free) for phase in self.phases)
+        for factor in _SLOWER if flies else _SLOWER[:1]:
             timings = tuple(
                 PhaseTiming.along(
                     path_phase.phase,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
 from brachis.problem.problem import Join, Problem
-from brachis.task import FREE, Mark
+from brachis.task import FREE, BoundarySettings, Mark
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class ProblemChain(Problem):
         flights: list[list[int]] = [[]]
         for number in range(last + 1):
             flights[-1].append(number)
-            if number < last and not (self.flies(number) or self.flies(last)):
+            if number < last and not (self.flies(number) or self.closes_in_motion):
                 flights.append([])
         return flights
 
@@ -137,6 +137,17 @@ class ProblemChain(Problem):
             (*self.chained[:number], part, *self.chained[number + 1 :])
         )
 
+    def piece(self, numbers: Sequence[int]) -> ProblemChain:
+        """Return the chain of some successive parts, which does not close."""
+        changes = {"start": "free", "end": "free", "boundary": BoundarySettings()}
+        task = self.task.model_copy(update=changes)
+        return replace(self.only(numbers), task=task, is_closed=False)
+
+    @property
+    def closes_in_motion(self) -> bool:
+        """Whether the last part flies into the first one."""
+        return self.task.boundary.end_speed == FREE
+
     def flies(self, number: int) -> bool:
         """Tell whether the arm passes from the part with a number to the next one without a stop."""
         return self.chained[number].task.boundary.end_speed == FREE
@@ -146,7 +157,7 @@ class ProblemChain(Problem):
         """Each place where two parts meet in motion, or in a posture that is free."""
         last = len(self.chained) - 1
         pairs = list(pairwise(range(last + 1)))
-        if self.is_closed or self.flies(last):
+        if self.is_closed or self.closes_in_motion:
             pairs.append((last, 0))
         joins = []
         for before, after in pairs:

@@ -81,9 +81,7 @@ def _guess_of(
     ]
     if len(parts) == 1:
         return parts[0]
-    task = chain.task.model_copy(update={"start": "free", "end": "free"})
-    problem = replace(chain.only(numbers), task=task)
-    return ChainGuess.of_parts(problem, parts, np.inf)
+    return ChainGuess.of_parts(chain.piece(numbers), parts, np.inf)
 
 
 def _between_postures(guess: ChainGuess) -> ProblemChain:

@@ -267,9 +267,8 @@ class _ChainSearch:
         """Improve the last path of a chain together with the move to it."""
         *before, move, path = chain.options
         assert path.guess is not None
-        problem = self.problem.only([move.number, path.number])
+        problem = self.problem.piece([move.number, path.number])
         first = replace(problem.parts[0], start=move.ends[0])
-        problem = replace(problem, is_closed=False)
         problem = problem.with_parts([first, path.guess.problem])
         guess = self._guess_parts(problem, (move, path), move.time + path.time)
         better = improve_quickly(guess, self.deadline, ROUGH, 1, self.listener)

@@ -6,15 +6,7 @@ import re
 import pytest
 
 import brachis
-
-TASK = {
-    "brachis": 1,
-    "robot": {"urdf": "scara3"},
-    "start": "free",
-    "path_start": [1.5, -0.3],
-    "path": [{"line": {"by": [0.0, 0.6]}}],
-    "task_space": ["x", "y"],
-}
+from support.movable import TASK
 
 
 def test_a_faster_place_is_printed_and_written(run, write, tmp_path):

@@ -7,15 +7,8 @@ import pytest
 import brachis
 from brachis.apps.place import read_range, write_task
 from brachis.errors import InputError, UnknownNameError
+from support.movable import TASK
 
-TASK = {
-    "brachis": 1,
-    "robot": {"urdf": "scara3"},
-    "start": "free",
-    "path_start": [1.5, -0.3],
-    "path": [{"line": {"by": [0.0, 0.6]}}],
-    "task_space": ["x", "y"],
-}
 RANGES = {"x": (-0.4, 0.2), "yaw_deg": (-30.0, 30.0)}
 
 
