@@ -135,8 +135,8 @@ def finish_candidate(
     finish = _finish_over_path if is_followed else _finish_over_time
     try:
         outcome = finish(candidate, session, options, to_beat)
-        is_slow = not outcome.is_settled or outcome.t_end > candidate.estimate
-        if not (program.flies and is_slow):
+        is_fast = outcome.is_settled and outcome.t_end <= candidate.estimate
+        if not program.flies or is_fast or to_beat.beat(outcome):
             return outcome
         # The estimate is the time of a motion that stops between the parts.
         at_rest = replace(candidate, program=program.at_rest())
