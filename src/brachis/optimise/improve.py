@@ -256,8 +256,8 @@ _ITERATIONS = 100
 """Maximum number of iterations per redundant joint that ``auto`` allows for a solve from one guess."""
 
 _LARGE_PROGRAM = 250
-"""Number of variables of a program over the path above which an interior-point method is at least as fast as other
-methods."""
+"""Number of variables of a program above which an interior-point method is at least as fast as other methods, from a
+start that is not close to the solution."""
 _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
 """`SolverOptions` for solves from a motion that is nearly as fast as possible. At such a motion very many rows are
 close to their bounds. With these options a small subproblem takes half as long."""
@@ -285,8 +285,6 @@ class SolverSession:
         Deadline of all solves together.
     progress : callable, optional
         Function called between iterations with their number and the objective.
-    acceptable : float
-        Largest violation with which a solution counts as usable, however the solve ended.
     for_large : Solver, optional
         Solver tried first on large programs over the path, because they are sparse; see `solver_for_large`.
     """
@@ -295,7 +293,6 @@ class SolverSession:
     options: SolverOptions
     deadline: Deadline
     progress: Progress | None = None
-    acceptable: float = -np.inf
     for_large: Solver | None = None
     _last: list[SolverReport] = field(default_factory=list, repr=False)
 
@@ -341,8 +338,14 @@ class SolverSession:
             max_iterations=min(options.max_iterations, task.max_iterations),
             time_limit=min(options.time_limit, task.time_limit),
             apart=task.apart,
+            acceptable=_NEARLY,
         )
-        return replace(self, options=path_options, acceptable=_NEARLY)
+        return replace(self, options=path_options)
+
+    def of_size(self, count: int) -> SolverSession:
+        """Return the session with the solver that is tried first on programs with a number of variables."""
+        is_large = count > _LARGE_PROGRAM and self.for_large is not None
+        return replace(self, backend=self.for_large) if is_large else self
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -376,16 +379,23 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # to keep results small
 
-        is_large = len(x) > _LARGE_PROGRAM and self.for_large is not self.backend
-        if isinstance(program, PathProgram) and is_large and self.for_large:
-            solve = partial(solve_with, self.for_large)
-            report = self._accept(solve_near_values(program, x, solve))
+        of_size = self.of_size(len(x)).backend
+        if isinstance(program, PathProgram) and of_size is not self.backend:
+            solve = partial(solve_with, of_size)
+            # From a motion that is far from the optimum, a solve with few values ends far beyond the others.
+            goes_on = self._goes_on(program, x)
+            report = (
+                solve_near_values(program, x, solve) if goes_on else solve(program, x)
+            )
+            report = self._accept(report)
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)
         if self.backend.is_interior:
             return self._accept(solve(program, x))
-        is_answer = self._goes_on(program, x)
+        # Programs over the path or with free knots end at a different motion if some values are left out.
+        is_fixed = isinstance(program, Program) and not program.has_free_knots
+        is_answer = is_fixed and self._goes_on(program, x)
         # Without these rows, nothing limits a joint that has no near row. Its jerk reached 500 times the limit.
         kept_rows = program.third_order_rows if isinstance(program, Program) else ()
         report = solve_near_rows(
@@ -394,19 +404,14 @@ class SolverSession:
         return self._accept(report)
 
     def _goes_on(self, program: Program | PathProgram, x: np.ndarray) -> bool:
-        """Tell whether the last solve gave a motion, and the point x, (v,), is about as fast as that motion.
-
-        Return False for programs over the path or with free knots. If some values are left out, such solves end at a
-        different motion.
-        """
-        is_fixed = isinstance(program, Program) and not program.has_free_knots
-        if not (is_fixed and self._last and self._last[0].status.usable):
+        """Tell whether the last solve gave a motion, and the point x, (v,), is about as fast as that motion."""
+        if not (self._last and self._last[0].status.usable):
             return False
         return bool(np.isclose(program.objective(x), self._last[0].objective, _SAME))
 
     def _accept(self, report: SolverReport) -> SolverReport:
         """Accept a solution that violates rows only slightly, however the solve ended."""
-        if report.status.usable or report.violation > self.acceptable:
+        if report.status.usable or report.violation > self.options.acceptable:
             return report
         return replace(report, status=SolveStatus.ACCEPTABLE)
 

@@ -37,6 +37,9 @@ from brachis.timing import Course, TimedCourse
 _DEGREE = 3
 _SLOWEST = 1e-3
 """Minimum of sdot^2 at stations other than the ends, as a fraction of its initial value."""
+_MOST_CHANGED = 4.0
+"""Maximum factor by which sdot^2 may increase or decrease at a station of a move. The path coordinate of a move is
+arbitrary, so without this bound the tangents vanish at a place that is passed with a very high sdot."""
 _STOPPED = 1e-8
 """Fraction of the median sdot^2 below which the tool counts as being at rest at a station."""
 _SHORTEST = tolerances.PATH
@@ -197,9 +200,13 @@ class PathPhase:
                     self.start[place] = condition.value
                     is_fixed[place] = True
         lower = np.full(len(self.start), -np.inf)
+        upper = np.full(len(self.start), np.inf)
         lower[:count] = _SLOWEST
+        if self.joint_map.is_move:
+            lower[:count] = 1.0 / _MOST_CHANGED
+            upper[:count] = _MOST_CHANGED
         self.x_lower = np.where(is_fixed, self.start, lower)
-        self.x_upper = np.where(is_fixed, self.start, np.inf)
+        self.x_upper = np.where(is_fixed, self.start, upper)
 
     def _begin_within_limits(self) -> None:
         """Start from the fastest timing of the splines over these stations, if the limits allow a timing."""
@@ -217,8 +224,9 @@ class PathPhase:
             return
         y, rates = timed.curves(timing, timing.times)
         timed_squares = np.interp(self._s, y[:, 0], rates[:, 0] ** 2) / self._units
-        inner = np.maximum(timed_squares[1:-1], _SLOWEST)
-        self.start[1 : len(self._s) - 1] = inner
+        inner = slice(1, len(self._s) - 1)
+        bounds = (self.x_lower[inner], self.x_upper[inner])
+        self.start[inner] = timed_squares[1:-1].clip(*bounds)
 
     def state(self, x: np.ndarray) -> JointState:
         """Return the joint motion at the places; raise as `evaluate` does."""

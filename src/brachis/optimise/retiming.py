@@ -40,6 +40,9 @@ _SOLVES_OF_FLIGHTS = 4
 program of a TX90L on its rail was 3 % slower."""
 _PLACES_AN_INTERVAL = 3.5
 """Number of places along the path, per interval, at which limits are imposed."""
+_LEAST_PLACES = 42
+"""Minimum number of these places in a phase. With 14, solutions of short moves were up to 7 % faster than their
+timings."""
 _NARROWED = 4
 """Maximum number of times that limits on postures are narrowed."""
 ROUGH_MARGIN = 0.02
@@ -342,7 +345,7 @@ def _better(
     for phase, phase_timing in zip(program.phases, best.timings, strict=True):
         share = phase_timing.t_end / best.t_end
         count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
-        stations = int(_PLACES_AN_INTERVAL * count)
+        stations = max(_LEAST_PLACES, int(_PLACES_AN_INTERVAL * count))
         count = max(_LEAST_INTERVALS, count // _divisor_of(phase))
         phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)

@@ -55,6 +55,7 @@ _OPTIONS = SolverOptions(
     progress=1e-2,  # an approximate optimum is enough
     patience=5,
     anywhere=True,
+    acceptable=FEASIBLE,
 )
 """Options that bound the effort of a solve."""
 
@@ -225,4 +226,4 @@ def _session(backend: Solver, deadline: Deadline, listener: Listener) -> SolverS
         text = f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
         listener(Iteration(text))
 
-    return SolverSession(backend, _OPTIONS, deadline, progress, acceptable=FEASIBLE)
+    return SolverSession(backend, _OPTIONS, deadline, progress)

@@ -216,21 +216,17 @@ def _finish_over_path(
     candidate = replace(candidate, adapted=least, reports=reports)
     if to_beat.adapted <= least < np.inf:
         return replace(candidate, status=SLOW)
-    longest = least + tolerance * retimed.t_end
-    motions = []
-    if retimed.solved is not None and retimed.solved.t_end < longest:
-        solved = replace(retimed.solved, reports=reports)
-        motion = _refine(candidate, solved, session, options)
-        motions.append(motion)
-        if motion.is_settled and motion.t_end < longest:
-            return motion
     laid = lay_along_timing(
         candidate, retimed.program, retimed.timings, reports, options
     )
-    if laid is not None:
-        if isinstance(laid, FinishedCandidate) and retimed.solved is not None:
-            laid = replace(laid, optimum=retimed.solved)
-        motions.append(laid)
+    motions = [] if laid is None else [laid]
+    solved = retimed.solved
+    if isinstance(laid, FinishedCandidate) and solved is not None:
+        motions = [replace(laid, optimum=solved)]
+    is_laid = laid is not None and laid.is_settled
+    if solved is not None and not (is_laid and laid.t_end < (1.0 + tolerance) * solved.t_end):
+        solved = replace(solved, reports=reports)
+        motions.append(_refine(candidate, solved, session, options))
     no_timing = replace(candidate, status=NO_TIMING)
     return faster(*motions, no_timing)
 

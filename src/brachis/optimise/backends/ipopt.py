@@ -48,6 +48,14 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
 
         return write
 
+    iterate = x
+
+    def differentiate(point: np.ndarray) -> np.ndarray:
+        """Return the Jacobian at a point. IPOPT asks for it only at iterates."""
+        nonlocal iterate
+        iterate = point.copy()
+        return monitor.jacobian(point)
+
     def intermediate(
         _mode: int,
         _iteration: int,
@@ -58,6 +66,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         *_: float,
     ) -> bool:
         """Tell whether IPOPT may continue after an iteration."""
+        monitor.keep(iterate, objective, infeasibility)
         return not monitor.ends_interior(objective, infeasibility, barrier)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
@@ -77,7 +86,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         lambda point: objective_at(program, point, np.nan),
         or_nan(monitor.gradient),
         or_nan(monitor.rows),
-        or_nan(monitor.jacobian, 0.0),  # NaN at the first point ends the process
+        or_nan(differentiate, 0.0),  # NaN at the first point ends the process
         intermediate_callback=intermediate,
         ipopt_options={
             "print_level": 0,
@@ -89,6 +98,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
             # Including the approximation in the linear system takes half as long as correcting the solution afterwards.
             "limited_memory_aug_solver": "extended",
             "mu_strategy": "adaptive",
+            # Bang-bang motions change in large steps, which a filter refuses: without this option, solves of seven
+            # phases were up to 5 % slower after 200 iterations.
+            "adaptive_mu_globalization": "kkt-error",
             "bound_relax_factor": 0.0,
         },
     )

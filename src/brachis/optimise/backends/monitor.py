@@ -50,7 +50,8 @@ class SolveMonitor:
     Attributes
     ----------
     best : tuple of (float, (v,) ndarray) or None
-        Objective and variables of the best feasible iterate that the backend has reported; None before the first.
+        The best iterate that the backend has reported, among those that are feasible or acceptable: its objective times
+        1 + violation, and its variables. None before the first.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class SolveMonitor:
         self.stagnated = False
         self._recent: list[float] = []
         self._feasible_below = 10.0 * options.tolerance
+        self._acceptable = max(self._feasible_below, options.acceptable)
         self._progress = progress
         self._handler: Any = None
         self._during: Any = None
@@ -112,10 +114,11 @@ class SolveMonitor:
         return self.must_stop()
 
     def keep(self, x: np.ndarray, objective: float, infeasibility: float) -> None:
-        """Store an iterate if it is the best feasible iterate so far."""
-        is_feasible = infeasibility <= self._feasible_below
-        if is_feasible and (self.best is None or objective < self.best[0]):
-            self.best = objective, x
+        """Store an iterate if it is the best one so far."""
+        needed = objective * (1.0 + infeasibility)
+        counts = infeasibility <= self._acceptable
+        if counts and (self.best is None or needed < self.best[0]):
+            self.best = needed, x
 
     def has_settled(self, objective: float, infeasibility: float) -> bool:
         """Tell whether iterates have stopped improving. Store the result in `stagnated`.
@@ -221,7 +224,8 @@ class SolveMonitor:
         if self.failure is not None:
             raise self.failure
         violation = residual(self.program, x)
-        if self.timed_out and violation > self._feasible_below and self.best:
+        ends_early = self.timed_out or status is SolveStatus.ITERATION_LIMIT
+        if ends_early and violation > self._acceptable and self.best:
             x = self.best[1]
             violation = residual(self.program, x)
             multipliers = np.zeros_like(multipliers)

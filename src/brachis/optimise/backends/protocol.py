@@ -112,6 +112,8 @@ class SolverOptions:
         ten times the tolerance, are compared.
     patience : int
         Number of iterates that count as the last iterates.
+    acceptable : float
+        Largest violation with which a solution counts as usable, however the solve ended.
     first_step : float
         Factor on the initial radius of the trust region, below 1 for starts close to the solution. Used by Uno.
     widening : float
@@ -132,6 +134,7 @@ class SolverOptions:
     time_limit: float = 20.0
     progress: float = 1e-6
     patience: int = 15
+    acceptable: float = -np.inf
     first_step: float = 1.0
     widening: float = 0.0
     anywhere: bool = False
