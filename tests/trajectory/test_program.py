@@ -80,7 +80,8 @@ def test_speeds_that_are_given_in_a_part_are_those_of_its_phases():
     assert kinds == ["move", "move", "given speed", "move", "move"]
     middle = 0.5 * (phases[2].begin + phases[2].end)
     (speed,) = result.trajectory.at(middle).tool_speed
-    assert speed == phases[2].speed == pytest.approx(0.2)
+    assert speed == pytest.approx(phases[2].speed)
+    assert phases[2].speed == pytest.approx(0.2)
 
 
 def test_programs_with_a_free_order_are_saved_with_the_order_that_was_chosen(tmp_path):

@@ -255,9 +255,9 @@ def with_last(
 _ITERATIONS = 100
 """Maximum number of iterations per redundant joint that ``auto`` allows for a solve from one guess."""
 
-_LARGE_PROGRAM = 250
-"""Number of variables of a program above which an interior-point method is at least as fast as other methods, from a
-start that is not close to the solution."""
+_LARGE_PROGRAM = 1_000_000
+"""Number of variables times rows of a program above which an interior-point method is at least as fast as other
+methods, from a start that is not close to the solution."""
 _NEAR_OPTIONS: dict[str, Any] = {"first_step": 0.1, "widening": 1e-6}
 """`SolverOptions` for solves from a motion that is nearly as fast as possible. At such a motion very many rows are
 close to their bounds. With these options a small subproblem takes half as long."""
@@ -342,9 +342,10 @@ class SolverSession:
         )
         return replace(self, options=path_options)
 
-    def of_size(self, count: int) -> SolverSession:
-        """Return the session with the solver that is tried first on programs with a number of variables."""
-        is_large = count > _LARGE_PROGRAM and self.for_large is not None
+    def of_size(self, program: NonlinearProgram) -> SolverSession:
+        """Return the session with the solver that is tried first on programs of this size."""
+        entries = len(program.x_lower) * len(program.lower)
+        is_large = entries > _LARGE_PROGRAM and self.for_large is not None
         return replace(self, backend=self.for_large) if is_large else self
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
@@ -379,7 +380,7 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # to keep results small
 
-        of_size = self.of_size(len(x)).backend
+        of_size = self.of_size(program).backend
         if isinstance(program, PathProgram) and of_size is not self.backend:
             solve = partial(solve_with, of_size)
             # From a motion that is far from the optimum, a solve with few values ends far beyond the others.

@@ -241,6 +241,6 @@ def _solve_from_timings(
     if begun is None:
         return None
     options = replace(session.options, acceptable=_NEARLY)
-    session = replace(session.of_size(len(begun[1])), options=options)
+    session = replace(session.of_size(begun[0]), options=options)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None

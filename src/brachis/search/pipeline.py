@@ -216,17 +216,34 @@ def _finish_over_path(
     candidate = replace(candidate, adapted=least, reports=reports)
     if to_beat.adapted <= least < np.inf:
         return replace(candidate, status=SLOW)
-    laid = lay_along_timing(
-        candidate, retimed.program, retimed.timings, reports, options
-    )
-    motions = [] if laid is None else [laid]
+    longest = least + tolerance * retimed.t_end
     solved = retimed.solved
-    if isinstance(laid, FinishedCandidate) and solved is not None:
-        motions = [replace(laid, optimum=solved)]
-    is_laid = laid is not None and laid.is_settled
-    if solved is not None and not (is_laid and laid.t_end < (1.0 + tolerance) * solved.t_end):
-        solved = replace(solved, reports=reports)
-        motions.append(_refine(candidate, solved, session, options))
+    is_large = solved is not None and session.of_size(solved.program) is not session
+
+    def lay() -> Candidate | None:
+        """Lay splines along the timing."""
+        laid = lay_along_timing(
+            candidate, retimed.program, retimed.timings, reports, options
+        )
+        if isinstance(laid, FinishedCandidate) and solved is not None:
+            return replace(laid, optimum=solved)
+        return laid
+
+    def refine() -> Candidate | None:
+        """Refine the motion over time if it is about as fast as the timing."""
+        if solved is None or solved.t_end >= longest:
+            return None
+        return _refine(candidate, replace(solved, reports=reports), session, options)
+
+    motions = []
+    # Refining a large program takes ten times as long as laying splines.
+    for follow in (lay, refine) if is_large else (refine, lay):
+        motion = follow()
+        if motion is None:
+            continue
+        motions.append(motion)
+        if motion.is_settled and (is_large or motion.t_end < longest):
+            return motion
     no_timing = replace(candidate, status=NO_TIMING)
     return faster(*motions, no_timing)
 
