@@ -345,8 +345,9 @@ class SolverSession:
     def of_size(self, program: NonlinearProgram) -> SolverSession:
         """Return the session with the solver that is tried first on programs of this size."""
         entries = len(program.x_lower) * len(program.lower)
-        is_large = entries > _LARGE_PROGRAM and self.for_large is not None
-        return replace(self, backend=self.for_large) if is_large else self
+        if self.for_large is None or entries <= _LARGE_PROGRAM:
+            return self
+        return replace(self, backend=self.for_large)
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).

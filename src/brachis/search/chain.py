@@ -1,13 +1,12 @@
 """The search over a program: joint paths of all its paths, joined by moves, by dynamic programming.
 
 The nodes are joint paths of each path. The price of a move between two of them is its least time in joint space, with
-the limits of the postures at which it ends. The best chains are improved, and with them the greedy chain, in which each
-path is the best one after the paths before it: prices are too rough to tell that it is faster.
+the limits of the postures at which it ends. The best chains are improved.
 """
 
 from __future__ import annotations
 
-import contextlib
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -18,15 +17,13 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import BrachisError, PathError, TaskError
 from brachis.optimise.backends import solvers_for
-from brachis.optimise.retiming import ROUGH
 from brachis.problem.chain import ProblemChain
 from brachis.problem.problem import Decomposition, Decompositions, Problem
 from brachis.search.failure import explain_no_motion, explain_reach
 from brachis.search.guesses import SEARCH_LEVELS, SearchLevel, joint_paths_in_charts
 from brachis.search.joint_path import ALL_POSTURES, DeadEnd
-from brachis.search.moves import move_guesses, price_move
+from brachis.search.moves import move_guesses, price_moves
 from brachis.search.schedule import Batch, batches, has_charts
-from brachis.search.screening import improve_quickly
 from brachis.search.stages import ChainGuess, InitialGuess
 
 _SHARE = 0.4
@@ -45,9 +42,6 @@ _MUCH_SLOWER = 1.5
 as fast as the best, and one that was 1.7 times as slow stayed so."""
 _KEPT = 24
 """Number of chains that are kept at each joint path."""
-_IMPROVED = 2
-"""Number of chains of which the last path is improved to find the greedy chain. With this chain, a program of a UR10
-took 1.38 s in place of 1.52 s."""
 _PATHS = 3
 """Number of paths up to which as many chains are improved as joint paths of a single path."""
 _APART = 0.5
@@ -157,25 +151,12 @@ class _ChainSearch:
         is_free = self.problem.task.order == "free"
         visit = self._visit_in_any_order if is_free else self._visit_in_order
         chains = sorted(visit(begun), key=lambda chain: chain.time)
-        guesses = self._passable(chains)
-        if not is_free and self._count_paths() > 1:
-            hurried = replace(self, deadline=self.deadline.part(_SHARE))
-            with contextlib.suppress(PathError):
-                guesses.append(hurried.guess_greedily(begun))
-        return guesses
-
-    def guess_greedily(self, begun: _Chain) -> ChainGuess:
-        """Return the guess of the chain in which each path is the best after those before it."""
-        chains = self._visit_in_order(begun, is_greedy=True)
-        return self._guess_of(min(chains, key=lambda chain: chain.time))
-
-    def _count_paths(self) -> int:
-        """Count the paths of the program."""
-        return sum(bool(part.task_map.m) for part in self.problem.parts)
+        return self._passable(chains)
 
     def _passable(self, chains: Sequence[_Chain]) -> list[ChainGuess]:
         """Return the guesses of the best distinct chains whose moves get round what is in their way."""
-        paths = max(self._count_paths(), _PATHS)
+        count_of_paths = sum(bool(part.task_map.m) for part in self.problem.parts)
+        paths = max(count_of_paths, _PATHS)
         count = max(1, self.level.in_charts * _PATHS // paths)
         guesses: list[ChainGuess] = []
         blocked: list[PathError] = []
@@ -206,12 +187,6 @@ class _ChainSearch:
             problem = problem.only([option.number for option in options])
         else:
             options.sort(key=lambda option: option.number)
-        return self._guess_parts(problem, options, chain.time)
-
-    def _guess_parts(
-        self, problem: ProblemChain, options: Sequence[_Option], time: float
-    ) -> ChainGuess:
-        """Return the guess of a program from options for all its parts; raise as `_guess_of` does."""
         guesses = []
         level = replace(self.level, in_charts=1)
         for option, part in zip(options, problem.parts, strict=True):
@@ -224,12 +199,10 @@ class _ChainSearch:
                 guess = replace(guess, problem=part)
             guesses.append(guess)
         problem = problem.with_parts([guess.problem for guess in guesses])
-        return ChainGuess.of_parts(problem, guesses, time)
+        return ChainGuess.of_parts(problem, guesses, chain.time)
 
-    def _visit_in_order(
-        self, begun: _Chain, *, is_greedy: bool = False
-    ) -> list[_Chain]:
-        """Return chains of all parts in their order, or the greedy one: each path is the best after those before it."""
+    def _visit_in_order(self, begun: _Chain) -> list[_Chain]:
+        """Return chains of all parts in their order."""
         parts = self.problem.parts
         first = 0
         if not begun.options:
@@ -253,34 +226,7 @@ class _ChainSearch:
                 chains = self._move_to_posture(chains, number)
             else:
                 chains = self._move(chains, number, self._options(path, chains))
-                if is_greedy:
-                    chains = self._improve_best(chains)
         return chains
-
-    def _improve_best(self, chains: Sequence[_Chain]) -> list[_Chain]:
-        """Improve the last path of the best chains together with the move to it; return the fastest chain."""
-        best = sorted(chains, key=lambda chain: chain.time)[:_IMPROVED]
-        improved = [self._improve_end(chain) for chain in best]
-        return [min(improved, key=lambda chain: chain.time)]
-
-    def _improve_end(self, chain: _Chain) -> _Chain:
-        """Improve the last path of a chain together with the move to it."""
-        *before, move, path = chain.options
-        assert path.guess is not None
-        problem = self.problem.piece([move.number, path.number])
-        first = replace(problem.parts[0], start=move.ends[0])
-        problem = problem.with_parts([first, path.guess.problem])
-        guess = self._guess_parts(problem, (move, path), move.time + path.time)
-        better = improve_quickly(guess, self.deadline, ROUGH, 1, self.listener)
-        if not better.is_improved:
-            return chain
-        ends = [self._ends_of(part) for part in better.alone]
-        time = chain.time - path.time - move.time
-        options = (
-            _Option(ends[0], move.number, better.estimate, better.alone[0]),
-            _Option(ends[1], path.number, 0.0, better.alone[1]),
-        )
-        return _Chain(tuple(before), time).followed_by(*options)
 
     def _ends_of(self, guess: InitialGuess) -> np.ndarray:
         """Return the postures at both ends of a guess, (2, n), without virtual joints."""
@@ -325,10 +271,11 @@ class _ChainSearch:
         options_of_all = []
         for number in paths:
             options = self._options(number, nearby)
-            prices = []
-            for option in options:
-                moves = (self._price(number - 1, chain, option) for chain in nearby)
-                prices.append(min(moves, default=0.0) + option.time)
+            times = np.array([option.time for option in options])
+            prices = self._price(number - 1, nearby, options).min(
+                axis=0, initial=np.inf
+            )
+            prices = times + (prices if nearby else 0.0)
             # The best joint path of every variant comes first: which is best depends on the order.
             order = np.argsort(prices, kind="stable")
             guesses = [options[i].guess for i in order]
@@ -385,13 +332,14 @@ class _ChainSearch:
     ) -> list[_Chain]:
         """Continue chains with a move to each goal and with the goal; keep the fastest chains to each."""
         longer = []
-        for goal in goals:
-            prices = [self._price(number, chain, goal) for chain in chains]
-            times = np.array(prices) + [chain.time for chain in chains]
-            for best in np.argsort(times, kind="stable")[:kept]:
+        prices = self._price(number, chains, goals)
+        times = prices + np.array([[chain.time] for chain in chains])
+        order = np.argsort(times, axis=0, kind="stable")[:kept]
+        for goal, best_chains, to_goal in zip(goals, order.T, prices.T, strict=True):
+            for best in best_chains:
                 chain = chains[best]
                 ends = np.array([chain.options[-1].ends[-1], goal.ends[0]])
-                move = _Option(ends, number, prices[best])
+                move = _Option(ends, number, float(to_goal[best]))
                 longer.append(chain.followed_by(move, goal))
         return longer
 
@@ -406,14 +354,23 @@ class _ChainSearch:
             closed += self._move([chain], number, [goal])
         return closed
 
-    def _price(self, number: int, chain: _Chain, goal: _Option) -> float:
-        """Return the least time of a move from the end of a chain, s; all moves between two options are the same."""
-        pair = (chain.options[-1], goal)
-        if pair not in self.prices:
-            part = self.problem.parts[number]
-            ends = pair[0].ends[-1], goal.ends[0]
-            self.prices[pair] = price_move(part, *ends)
-        return self.prices[pair]
+    def _price(
+        self, number: int, chains: Sequence[_Chain], goals: Sequence[_Option]
+    ) -> np.ndarray:
+        """Return the least times of moves, s, from the end of each chain to each goal.
+
+        All moves between two options take as long.
+        """
+        ends = [chain.options[-1] for chain in chains]
+        pairs = list(itertools.product(ends, goals))
+        unknown = [pair for pair in dict.fromkeys(pairs) if pair not in self.prices]
+        if unknown:
+            begins = np.array([begin.ends[-1] for begin, _ in unknown])
+            stops = np.array([goal.ends[0] for _, goal in unknown])
+            times = price_moves(self.problem.parts[number], begins, stops)
+            self.prices.update(zip(unknown, times.tolist(), strict=True))
+        prices = [self.prices[pair] for pair in pairs]
+        return np.reshape(prices, (len(ends), len(goals)))
 
     def _options(
         self,

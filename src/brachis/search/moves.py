@@ -109,18 +109,17 @@ def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:
     return InitialGuess(problem, chart, curves, estimate, origin, CHART)
 
 
-def price_move(part: Problem, begin: np.ndarray, end: np.ndarray) -> float:
-    """Estimate the least time, s, of a move from a posture to another, (n,) each.
+def price_moves(part: Problem, begins: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Estimate the least times, (N,) s, of moves from postures to others, (N, n) each.
 
     With limits on accelerations and torques at the average posture, a straight joint line takes 2 sqrt(A), and with
     limits on velocities B + A / B if it reaches them; see `step_lengths` for A and B.
     """
-    middle = 0.5 * (begin + end)
-    step = end - begin
-    lengths = step_lengths(
-        part.limits, middle[None], step[None], np.zeros(1, dtype=int)
-    )
-    (by_acceleration,), (by_velocity,) = lengths
-    if np.sqrt(by_acceleration) < by_velocity:
-        return float(by_velocity + by_acceleration / by_velocity)
-    return float(2.0 * np.sqrt(by_acceleration))
+    middles = 0.5 * (begins + ends)
+    numbers = np.arange(len(middles))
+    lengths = step_lengths(part.limits, middles, ends - begins, numbers)
+    by_acceleration, by_velocity = lengths
+    reaches = np.sqrt(by_acceleration) < by_velocity
+    highest = np.where(reaches, by_velocity, np.sqrt(by_acceleration))
+    # Without acceleration, as for a move between equal postures, both terms are zero.
+    return highest + by_acceleration / np.maximum(highest, np.finfo(float).tiny)
