@@ -30,9 +30,10 @@ _CREDIBLE = 0.01
 _MOST_INTERVALS = 256
 """Maximum number of intervals of all redundant curves together. With four curves of 128 intervals, a solve takes half a
 minute and gains only 0.2 %."""
-_LEAST_INTERVALS = 4
-"""Minimum number of intervals of a redundant curve in a phase, however short the phase."""
-_FEWER_IN_MOVES = 4
+_LEAST_INTERVALS = 12
+"""Minimum number of intervals in a phase, however short the phase. With 4, solutions of short moves were up to 7 %
+faster than their timings, and programs of three paths took 0.2 % longer."""
+_FEWER_IN_MOVES = 3
 """Divisor of the number of intervals in a move, at as many places. No path bends the curves of a move: with 16
 intervals, moves of an iiwa14 round obstacles were as fast as with 4, and took 2 to 4 times as long."""
 _SOLVES_OF_FLIGHTS = 4
@@ -40,9 +41,6 @@ _SOLVES_OF_FLIGHTS = 4
 program of a TX90L on its rail was 3 % slower."""
 _PLACES_AN_INTERVAL = 3.5
 """Number of places along the path, per interval, at which limits are imposed."""
-_LEAST_PLACES = 42
-"""Minimum number of these places in a phase. With 14, solutions of short moves were up to 7 % faster than their
-timings."""
 _NARROWED = 4
 """Maximum number of times that limits on postures are narrowed."""
 ROUGH_MARGIN = 0.02
@@ -67,6 +65,9 @@ class PathEffort:
         Minimum branch margin.
     options : SolverOptions
         Options of each solve. Limits may be exceeded slightly, because the timing is recomputed.
+    known : int, optional
+        Number of intervals with which the given joint paths were found; 0 if they are only guesses. A number that
+        divides into as many for each phase is not tried.
     is_rough_before, is_rough_after : bool, optional
         Whether joint paths are timed only roughly before they are improved, and after. For a joint path that is not
         improved, `is_rough_after` applies. A rough timing does not show gains or losses below 1 %.
@@ -78,6 +79,7 @@ class PathEffort:
     places: int
     margin: float
     options: SolverOptions
+    known: int = 0
     is_rough_before: bool = False
     is_rough_after: bool = False
     posture_violation: float = 5e-5
@@ -121,6 +123,7 @@ FINE = PathEffort(
     intervals=(32, 64, 128, 256),
     places=PLACES,
     margin=MARGIN,
+    known=16,
     options=SolverOptions(
         tolerance=1e-5,
         max_iterations=100,
@@ -316,7 +319,13 @@ def improve_joint_paths(
     for count in counts:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
-        if is_too_large or not np.isfinite(before) or solve.deadline.passed:
+        shares = [timing.t_end / before for timing in best.timings]
+        is_known = effort.known > 0 and not program.flies
+        is_known = is_known and all(
+            _share_intervals(count, share) == _share_intervals(effort.known, share)
+            for share in shares
+        )
+        if is_too_large or is_known or not np.isfinite(before) or solve.deadline.passed:
             break
         best = _better(apart, solve, effort, count, best)
         goes_on = best.is_credible or program.flies
@@ -325,6 +334,11 @@ def improve_joint_paths(
     if best.timings is timings and is_first_rough and not effort.is_rough_after:
         best = replace(best, timings=time_paths(is_rough=False))
     return best
+
+
+def _share_intervals(intervals: int, share: float) -> int:
+    """Return the number of intervals of a phase, from that of all phases and the phase's share of their time."""
+    return max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
 
 
 def _divisor_of(phase: Phase) -> int:
@@ -343,10 +357,9 @@ def _better(
     """Solve over the path from the best joint paths so far, and return the better joint paths."""
     phases = []
     for phase, phase_timing in zip(program.phases, best.timings, strict=True):
-        share = phase_timing.t_end / best.t_end
-        count = max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
-        stations = max(_LEAST_PLACES, int(_PLACES_AN_INTERVAL * count))
-        count = max(_LEAST_INTERVALS, count // _divisor_of(phase))
+        count = _share_intervals(intervals, phase_timing.t_end / best.t_end)
+        stations = int(_PLACES_AN_INTERVAL * count)
+        count //= _divisor_of(phase)
         phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)
