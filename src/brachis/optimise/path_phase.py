@@ -26,10 +26,10 @@ from brachis.errors import UnreachableError
 from brachis.kernel import CurvePattern, VariableSlopes
 from brachis.kinematics import JointState
 from brachis.limits import Limit, Moments
-from brachis.optimise.boundary import Boundary, LocalBasis
+from brachis.optimise.boundary import LocalBasis
 from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
-from brachis.optimise.motion import Motion, follow_law
+from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.timing import Course, TimedCourse
@@ -129,11 +129,6 @@ class PathPhase:
         rates = phase_timing.course.curves(timing, np.interp(self._s, s, t))[1][:, 0]
         squares = (rates if law is None else follow_law(law, self._s)[1]) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
-        # At rest, a solver would not see how a free speed depends on the tangents.
-        for end, beside in zip((0, -1), (1, -2), strict=True):
-            if phase.boundary.are_speeds_free[end]:
-                squares[end] = max(squares[end], squares[beside])
-                self._units[end] = max(self._units[end], squares[end])
         self._last_interval = timing.t_end / intervals
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
         self.breaks = np.interp(edges, t, s)
@@ -190,7 +185,7 @@ class PathPhase:
         self.start = np.concatenate([squares / self._units, points.ravel()])
         is_fixed = np.zeros(len(self.start), dtype=bool)
         boundary = self.phase.boundary
-        is_fixed[[0, count - 1]] = np.logical_not(boundary.are_speeds_free)
+        is_fixed[[0, count - 1]] = True
         if boundary.time_law is not None:
             is_fixed[:count] = True
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
@@ -204,7 +199,7 @@ class PathPhase:
         lower[:count] = _SLOWEST
         if self.joint_map.is_move:
             lower[:count] = 1.0 / _MOST_CHANGED
-            upper[:count] = _MOST_CHANGED
+            upper[:count] = _MOST_CHANGED * self._units.max() / self._units
         self.x_lower = np.where(is_fixed, self.start, lower)
         self.x_upper = np.where(is_fixed, self.start, upper)
 
@@ -254,29 +249,12 @@ class PathPhase:
             slopes[:, 1 + curve, first : first + width] = by_points[:, point]
         return slopes
 
-    def boundary_at(self, x: np.ndarray, factor: float) -> Boundary:
-        """Return the conditions at both ends, with all free speeds smaller than at x by a factor."""
-        (y, y_ds, y_dds), square, u = self._evaluate(x)[0]
-        ydot = factor * y_ds * np.sqrt(square)
-        yddot = factor**2 * (y_dds * square + y_ds * u)
-        orders = np.array([y, ydot, yddot])[:, [0, -1]].swapaxes(0, 1)
-        return self.phase.boundary.with_speeds(orders)
-
-    def with_end(self, x: np.ndarray, end: int, orders: np.ndarray) -> np.ndarray:
-        """Return x with given joint positions at an end and, for a move, their time derivatives, (1 + k, n or more)."""
-        _, square, u = self._evaluate(x)[0]
-        q = orders[0, : self.joint_map.robot.n]
-        values = [self.joint_map.coordinates(self.ends[end], q)[1:]]
-        if len(orders) > 1:
-            values.append(orders[1] / np.sqrt(square[end]))
-        if len(orders) > 2:
-            values.append((orders[2] - values[1] * u[end]) / square[end])
-        points = self._split(x)[1]
-        motion = Motion(1.0, self._knots, _DEGREE, points)
-        points = motion.with_end(
-            end, np.array(values), range(self.curves_count)
-        ).control_points
-        return np.concatenate([x[: len(self._s)], points.ravel()])
+    def with_end(self, x: np.ndarray, end: int, q: np.ndarray) -> np.ndarray:
+        """Return x with given joint positions at an end, (n or more,)."""
+        met = x.copy()
+        q = q[: self.joint_map.robot.n]
+        met[self.places_at(end)] = self.joint_map.coordinates(self.ends[end], q)[1:]
+        return met
 
     def places_at(self, end: int) -> np.ndarray:
         """Return the indices, (r,), of the variables that are the redundant curves' values at an end (0 or -1)."""
@@ -375,13 +353,12 @@ class PathPhase:
         return float((2.0 * self._steps / (rates[1:] + rates[:-1])).sum())
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Return the gradient of the time, (v,). It is zero with respect to X at an end where it is given."""
+        """Return the gradient of the time, (v,). It is zero with respect to X at the ends, where it is given."""
         rates = np.sqrt(self._split(x)[0].clip(_NOTHING))
         by_sum = -2.0 * self._steps / (rates[1:] + rates[:-1]) ** 2
         by_rate = np.pad(by_sum, (1, 0)) + np.pad(by_sum, (0, 1))
         by_square = by_rate / (2.0 * rates) * self._units
-        is_given = np.logical_not(self.phase.boundary.are_speeds_free)
-        by_square[np.array([0, -1])[is_given]] = 0.0
+        by_square[[0, -1]] = 0.0
         return np.pad(by_square, (0, len(x) - len(by_square)))
 
     def rows(self, x: np.ndarray) -> np.ndarray:

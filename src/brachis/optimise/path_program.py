@@ -13,10 +13,6 @@ from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.program import PhaseSequence
 
-_SLOWER = (1.0, 0.99, 0.97, 0.9, 0.7)
-"""Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing. A solution
-meets the limits only at its stations; on programs of three seams, 0.97 was enough."""
-
 
 class PathProgram(PhaseSequence[PathPhase]):
     """The NLP over the path of all phases, as a `NonlinearProgram` for the solvers.
@@ -129,10 +125,8 @@ class PathProgram(PhaseSequence[PathPhase]):
             if isinstance(link, PostureLink):
                 (moved, end), (kept, place) = link.sides(self.phases)
                 phase, x_of_phase = parts[kept]
-                state = phase.state(x_of_phase)
-                orders = np.array([state.q, state.qdot, state.qddot])[:, place]
-                linked = orders[: 1 + max(link.orders), : link.combinations.shape[1]]
-                met[moved] = self.phases[moved].with_end(met[moved], end, linked)
+                q = phase.state(x_of_phase).q[place, : link.combinations.shape[1]]
+                met[moved] = self.phases[moved].with_end(met[moved], end, q)
         return np.concatenate(met)
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -150,19 +144,13 @@ class PathProgram(PhaseSequence[PathPhase]):
         self, x: np.ndarray, places: int, *, is_rough: bool
     ) -> tuple[PhaseTiming, ...]:
         """Time the joint paths of all phases again with `PhaseTiming.along`."""
-        flies = any(any(phase.phase.boundary.are_speeds_free) for phase in self.phases)
-        for factor in _SLOWER if flies else _SLOWER[:1]:
-            timings = tuple(
-                PhaseTiming.along(
-                    path_phase.phase,
-                    partial(path_phase.course, x_of_phase),
-                    path_phase.ends,
-                    places,
-                    boundary=path_phase.boundary_at(x_of_phase, factor),
-                    is_rough=is_rough,
-                )
-                for path_phase, x_of_phase in self.split(x)
+        return tuple(
+            PhaseTiming.along(
+                path_phase.phase,
+                partial(path_phase.course, x_of_phase),
+                path_phase.ends,
+                places,
+                is_rough=is_rough,
             )
-            if all(timing.timing is not None for timing in timings):
-                break
-        return timings
+            for path_phase, x_of_phase in self.split(x)
+        )

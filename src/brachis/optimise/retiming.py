@@ -36,9 +36,6 @@ faster than their timings, and programs of three paths took 0.2 % longer."""
 _FEWER_IN_MOVES = 3
 """Divisor of the number of intervals in a move, at as many places. No path bends the curves of a move: with 16
 intervals, moves of an iiwa14 round obstacles were as fast as with 4, and took 2 to 4 times as long."""
-_SOLVES_OF_FLIGHTS = 4
-"""Maximum number of solves over the same intervals if phases meet in motion, because one solve ends early. With 1, a
-program of a TX90L on its rail was 3 % slower."""
 _PLACES_AN_INTERVAL = 3.5
 """Number of places along the path, per interval, at which limits are imposed."""
 _NARROWED = 4
@@ -310,26 +307,21 @@ def improve_joint_paths(
     is_first_rough = effort.is_rough_before if r else effort.is_rough_after
     timings = time_paths(is_rough=is_first_rough)
     best = BetterPaths(tuple(curves), timings, (), beyond)
-    if not (r or program.flies):
+    if not r:
         return best
     apart = program.with_margin(effort.margin)
-    counts = effort.intervals
-    if program.flies:
-        counts = effort.intervals[:1] * _SOLVES_OF_FLIGHTS
-    for count in counts:
+    for count in effort.intervals:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
         shares = [timing.t_end / before for timing in best.timings]
-        is_known = effort.known > 0 and not program.flies
-        is_known = is_known and all(
+        is_known = effort.known > 0 and all(
             _share_intervals(count, share) == _share_intervals(effort.known, share)
             for share in shares
         )
         if is_too_large or is_known or not np.isfinite(before) or solve.deadline.passed:
             break
         best = _better(apart, solve, effort, count, best)
-        goes_on = best.is_credible or program.flies
-        if not goes_on or best.t_end > before * (1.0 - tolerance):
+        if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
     if best.timings is timings and is_first_rough and not effort.is_rough_after:
         best = replace(best, timings=time_paths(is_rough=False))

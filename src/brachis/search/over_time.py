@@ -187,10 +187,11 @@ def improve_timings(
     Returns
     -------
     BetterTimings
-        The given timings if no joint is redundant, no time is left, or the solve gives no motion.
+        The given timings if no joint is redundant and no speed is free, no time is left, or the solve gives no motion.
     """
     unimproved = BetterTimings(program, paths.timings)
-    if not guess.joint_map.r or session.deadline.passed:
+    is_free = bool(guess.joint_map.r) or program.flies
+    if not is_free or session.deadline.passed:
         return unimproved
     followed = zip(program.phases, paths.curves, strict=True)
     restricted = program.with_phases(

@@ -134,13 +134,7 @@ def finish_candidate(
     session = _open_session(candidate.guess, deadline.part(share), listener)
     finish = _finish_over_path if is_followed else _finish_over_time
     try:
-        outcome = finish(candidate, session, options, to_beat)
-        is_fast = outcome.is_settled and outcome.t_end <= candidate.estimate
-        if not program.flies or is_fast or to_beat.beat(outcome):
-            return outcome
-        # The estimate is the time of a motion that stops between the parts.
-        at_rest = replace(candidate, program=program.at_rest())
-        return faster(outcome, finish(at_rest, session, options, to_beat))
+        return finish(candidate, session, options, to_beat)
     except UnreachableError as error:
         return fail(candidate, str(error))
 
@@ -206,9 +200,6 @@ def _finish_over_path(
     at_rest = program.at_rest()
     paths = improve_joint_paths(at_rest, guess.legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
-    if program.flies:
-        paths = improve_joint_paths(program, paths.curves, session, tolerance, FINE)
-        reports = (*reports, *paths.reports)
     session = shorten_solves(session)
     retimed = improve_timings(guess, program, paths, session)
     reports = (*reports, *retimed.reports)
