@@ -24,9 +24,9 @@ _MOST_PLACES = 40_000
 """Approximate maximum number of places in all pieces together."""
 _ROUGH_AGREEMENT = 1e-3
 """Relative change of the time at which a rough timing ends."""
-_SLOWER = (1.0, 0.99, 0.97, 0.9, 0.7)
+_SLOWER = (1.0, 0.999, 0.995, 0.985, 0.97, 0.95, 0.92, 0.85, 0.7)
 """Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing. A solution
-meets the limits only at its points; on programs of three seams, 0.97 was enough."""
+meets the limits only at its points; on programs of three seams, 0.92 was enough."""
 _LEAST_PLACES = 12
 """Minimum number of places in each knot interval."""
 _FEW_PLACES = 2
