@@ -308,7 +308,9 @@ def test_slopes_of_links_agree_with_differences(linked):
 def test_slopes_of_the_program_over_the_path_agree_with_differences(linked):
     problem, program, x = linked
     phases = []
-    for phase, motion in zip(program.phases, program.motions(x), strict=True):
+    motions = program.motions(x)
+    program = program.at_rest()
+    for phase, motion in zip(program.phases, motions, strict=True):
         curves = motion.at(np.linspace(0.0, motion.t_end, 201))[0]
         timing = PhaseTiming.through(phase, curves, 200)
         phases.append(PathPhase(phase, timing, 4, 14))

@@ -129,7 +129,6 @@ class PathPhase:
         rates = phase_timing.course.curves(timing, np.interp(self._s, s, t))[1][:, 0]
         squares = (rates if law is None else follow_law(law, self._s)[1]) ** 2
         self._units = np.maximum(squares, _STOPPED * np.median(squares))
-        self._last_interval = timing.t_end / intervals
         edges = np.linspace(0.0, timing.t_end, intervals + 1)
         self.breaks = np.interp(edges, t, s)
         self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
@@ -191,7 +190,7 @@ class PathPhase:
         for conditions, end in (boundary.start, 0), (boundary.end, -1):
             for j, condition in enumerate(conditions[1:]):
                 if np.isfinite(condition.value):
-                    place = self.places_at(end)[j]
+                    place = self.end_pattern(end)[j]
                     self.start[place] = condition.value
                     is_fixed[place] = True
         lower = np.full(len(self.start), -np.inf)
@@ -227,36 +226,24 @@ class PathPhase:
         """Return the joint motion at the places; raise as `evaluate` does."""
         return self.evaluate(x).motion
 
-    def last_interval(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the initial duration of the last spline interval, s, and zero slopes, (z,)."""
-        return self._last_interval, np.zeros(len(self.end_pattern(-1)))
+    def last_interval(self, _x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return any duration, s, and its slopes, (z,), because only values are linked."""
+        return 1.0, np.zeros(self.curves_count)
 
-    def end_pattern(self, point: int) -> np.ndarray:
-        """Return the variables, (z,), that affect the curves at an end: X at two stations, and control points."""
-        first = (self._number[point], self._number[point] + 1)
-        curves = np.arange(self.curves_count)[:, None] * self._count
-        points = len(self._s) + curves + self._basis.columns[point]
-        return np.concatenate([first, points.ravel()])
-
-    def end_slopes(self, x: np.ndarray, point: int) -> np.ndarray:
-        """Return slopes of the curves and their time derivatives at an end, (3, c, z); see `end_pattern`."""
-        by_squares, by_points = self._slopes(x)
-        width = by_points.shape[-1]
-        slopes = np.zeros((3, 1 + self.curves_count, 2 + width * self.curves_count))
-        slopes[:, :, :2] = by_squares[:, :, point].transpose(1, 2, 0)
-        for curve in range(self.curves_count):
-            first = 2 + width * curve
-            slopes[:, 1 + curve, first : first + width] = by_points[:, point]
+    def end_slopes(self, _x: np.ndarray, _end: int) -> np.ndarray:
+        """Return slopes of the curves at an end, (3, c, r); those of time derivatives are left out."""
+        slopes = np.zeros((3, 1 + self.curves_count, self.curves_count))
+        slopes[0, 1:] = np.eye(self.curves_count)
         return slopes
 
     def with_end(self, x: np.ndarray, end: int, q: np.ndarray) -> np.ndarray:
         """Return x with given joint positions at an end, (n or more,)."""
         met = x.copy()
         q = q[: self.joint_map.robot.n]
-        met[self.places_at(end)] = self.joint_map.coordinates(self.ends[end], q)[1:]
+        met[self.end_pattern(end)] = self.joint_map.coordinates(self.ends[end], q)[1:]
         return met
 
-    def places_at(self, end: int) -> np.ndarray:
+    def end_pattern(self, end: int) -> np.ndarray:
         """Return the indices, (r,), of the variables that are the redundant curves' values at an end (0 or -1)."""
         curves = np.arange(self.curves_count)
         return len(self._s) + curves * self._count + end % self._count
