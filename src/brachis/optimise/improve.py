@@ -389,7 +389,9 @@ class SolverSession:
             report = (
                 solve_near_values(program, x, solve) if goes_on else solve(program, x)
             )
-            report = self._accept(report)
+            # If a row cannot be met, this solver ends at its start; the other one makes the motion faster.
+            if report.status is not SolveStatus.INFEASIBLE:
+                report = self._accept(report)
             if report.status.usable:
                 return report
         solve = partial(solve_with, self.backend)

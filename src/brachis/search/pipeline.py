@@ -69,6 +69,8 @@ _BEFORE_REFINEMENT = 0.5
 _IF_SHORT = 0.2
 """The same fraction if there is little time and splines are laid, which takes half a second. With 0.5, splines were
 laid too late."""
+_WORTH_REFINING = 0.05
+"""Fraction of the time that refinement must save for a large program to be refined before splines are laid."""
 
 
 def rank_candidate(
@@ -209,7 +211,12 @@ def _finish_over_path(
         return replace(candidate, status=SLOW)
     longest = least + tolerance * retimed.t_end
     solved = retimed.solved
-    is_large = solved is not None and session.of_size(solved.program) is not session
+    # Refining a large program takes ten times as long as laying splines.
+    is_laid_first = (
+        solved is not None
+        and session.of_size(solved.program) is not session
+        and least < (1.0 + _WORTH_REFINING) * solved.t_end
+    )
 
     def lay() -> Candidate | None:
         """Lay splines along the timing."""
@@ -227,13 +234,12 @@ def _finish_over_path(
         return _refine(candidate, replace(solved, reports=reports), session, options)
 
     motions = []
-    # Refining a large program takes ten times as long as laying splines.
-    for follow in (lay, refine) if is_large else (refine, lay):
+    for follow in (lay, refine) if is_laid_first else (refine, lay):
         motion = follow()
         if motion is None:
             continue
         motions.append(motion)
-        if motion.is_settled and (is_large or motion.t_end < longest):
+        if motion.is_settled and (is_laid_first or motion.t_end < longest):
             return motion
     no_timing = replace(candidate, status=NO_TIMING)
     return faster(*motions, no_timing)

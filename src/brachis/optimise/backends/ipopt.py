@@ -14,6 +14,8 @@ from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_
 from brachis.optimise.backends.protocol import SolverReport, SolveStatus
 
 NAME = "ipopt"
+_RESTORATION = 1
+"""IPOPT's mode in which it ignores the objective, and looks for a feasible point."""
 _STATUS = {
     0: SolveStatus.OPTIMAL,
     1: SolveStatus.ACCEPTABLE,
@@ -57,7 +59,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         return monitor.jacobian(point)
 
     def intermediate(
-        _mode: int,
+        mode: int,
         _iteration: int,
         objective: float,
         infeasibility: float,
@@ -67,6 +69,8 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     ) -> bool:
         """Tell whether IPOPT may continue after an iteration."""
         monitor.keep(iterate, objective, infeasibility)
+        if mode == _RESTORATION:
+            barrier = np.inf
         return not monitor.ends_interior(objective, infeasibility, barrier)
 
     def clip(bounds: np.ndarray) -> np.ndarray:

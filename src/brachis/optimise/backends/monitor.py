@@ -120,20 +120,25 @@ class SolveMonitor:
         if counts and (self.best is None or needed < self.best[0]):
             self.best = needed, x
 
-    def has_settled(self, objective: float, infeasibility: float) -> bool:
+    def has_settled(
+        self, objective: float, infeasibility: float, *, may_rise: bool = False
+    ) -> bool:
         """Tell whether iterates have stopped improving. Store the result in `stagnated`.
 
         If no limit affects a redundant joint, for example the roll of a tool, there is a set of equally fast motions. A
         solver wanders within this set without ever meeting its optimality conditions. Iterates are compared by their
-        objective times 1 + violation. The last iterate has to be feasible.
+        objective times 1 + violation. The last iterate has to be feasible. If iterates may become slower before they become
+        faster, only those just before the last ones count, and a rise counts as much as a gain.
         """
         needed = objective * (1.0 + infeasibility)
         counts = infeasibility <= max(_NEARLY_FEASIBLE, self._feasible_below)
         self._recent = [*self._recent, needed] if counts else []
         patience = self.options.patience
-        before = self._recent[:-patience]
+        first = -2 * patience if may_rise else None
+        before = self._recent[first:-patience]
         least = self.options.progress * abs(objective)
-        gains = bool(before) and min(before) - min(self._recent[-patience:]) > least
+        gain = min(before) - min(self._recent[-patience:]) if before else 0.0
+        gains = (abs(gain) if may_rise else gain) > least
         is_feasible = infeasibility <= self._feasible_below
         self.stagnated = bool(before) and is_feasible and not gains
         return self.stagnated
@@ -143,12 +148,11 @@ class SolveMonitor:
     ) -> bool:
         """Tell whether an interior-point method has to stop after an iteration, or has settled.
 
-        With a large barrier parameter, iterates are slower than the starting point. This does not mean that the solve
-        has settled.
+        It moves away from the bounds first: its iterates are slower than the starting point for some time.
         """
         stop = self.between_iterations(objective)
         violation = infeasibility if barrier <= _SMALL_BARRIER else np.inf
-        return self.has_settled(objective, violation) or stop
+        return self.has_settled(objective, violation, may_rise=True) or stop
 
     def must_stop(self) -> bool:
         """Tell whether the user has interrupted the solve, or its time or its evaluations are used up."""
