@@ -127,8 +127,8 @@ class SolveMonitor:
 
         If no limit affects a redundant joint, for example the roll of a tool, there is a set of equally fast motions. A
         solver wanders within this set without ever meeting its optimality conditions. Iterates are compared by their
-        objective times 1 + violation. The last iterate has to be feasible. If iterates may become slower before they become
-        faster, only those just before the last ones count, and a rise counts as much as a gain.
+        objective times 1 + violation. The last iterate has to be feasible. If iterates may become slower before they
+        become faster, only those just before the last ones count, and a rise counts as much as a gain.
         """
         needed = objective * (1.0 + infeasibility)
         counts = infeasibility <= max(_NEARLY_FEASIBLE, self._feasible_below)
