@@ -361,8 +361,11 @@ def _better(
         for _ in range(_NARROWED):
             if violation < effort.posture_violation or solve.deadline.passed:
                 break
-            report = solve(over_path, report.x)
-            reports = (*reports, report)
+            narrowed = solve(over_path, report.x)
+            reports = (*reports, narrowed)
+            if not narrowed.status.usable:
+                break
+            report = narrowed
             violation = over_path.narrow(report.x)
         x = over_path.meet(report.x)
         timings = over_path.timings(x, effort.places, is_rough=effort.is_rough_after)
