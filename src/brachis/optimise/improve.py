@@ -286,7 +286,7 @@ class SolverSession:
     progress : callable, optional
         Function called between iterations with their number and the objective.
     for_large : Solver, optional
-        Solver tried first on large programs over the path, because they are sparse; see `solver_for_large`.
+        Solver that is tried first on large programs, because they are sparse; see `solver_for_large`.
     """
 
     backend: Solver
@@ -384,13 +384,14 @@ class SolverSession:
         of_size = self.of_size(program).backend
         if isinstance(program, PathProgram) and of_size is not self.backend:
             solve = partial(solve_with, of_size)
-            # From a motion that is far from the optimum, a solve with few values ends far beyond the others.
+            # From a motion far from the optimum, a solve with the near values alone far exceeds limits of others.
             goes_on = self._goes_on(program, x)
             report = (
                 solve_near_values(program, x, solve) if goes_on else solve(program, x)
             )
-            # If a row cannot be met, this solver ends at its start; the other one makes the motion faster.
-            if report.status is not SolveStatus.INFEASIBLE:
+            # If a row cannot be met, this solver ends at its start. The other one still makes the motion faster.
+            is_lost = report.status is SolveStatus.INFEASIBLE
+            if not (is_lost and report.objective >= program.objective(x)):
                 report = self._accept(report)
             if report.status.usable:
                 return report

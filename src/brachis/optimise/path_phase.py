@@ -38,8 +38,9 @@ _DEGREE = 3
 _SLOWEST = 1e-3
 """Minimum of sdot^2 at stations other than the ends, as a fraction of its initial value."""
 _MOST_CHANGED = 4.0
-"""Maximum factor by which sdot^2 may increase or decrease at a station of a move. The path coordinate of a move is
-arbitrary, so without this bound the tangents vanish at a place that is passed with a very high sdot."""
+"""Factor on bounds of sdot^2 in a move: at a station at least the initial value divided by it, and nowhere more than
+the largest initial value times it. The path coordinate of a move is arbitrary. Without these bounds, its tangents
+vanish at a place that is passed with a very high sdot."""
 _STOPPED = 1e-8
 """Fraction of the median sdot^2 below which the tool counts as being at rest at a station."""
 _SHORTEST = tolerances.PATH
@@ -78,7 +79,7 @@ class PathPhase:
     Parameters
     ----------
     phase : Phase
-        Phase along a path, with limits up to the second order.
+        Phase along a path, with limits up to the second order and given speeds at both ends.
     phase_timing : PhaseTiming
         Timing from which the solve starts.
     intervals, stations : int
@@ -227,21 +228,23 @@ class PathPhase:
         return self.evaluate(x).motion
 
     def last_interval(self, _x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return any duration, s, and its slopes, (z,), because only values are linked."""
+        """Return 1 s and zero slopes, (r,): links of values do not depend on the duration."""
         return 1.0, np.zeros(self.curves_count)
 
     def end_slopes(self, _x: np.ndarray, _end: int) -> np.ndarray:
-        """Return slopes of the curves at an end, (3, c, r); those of time derivatives are left out."""
+        """Return slopes of the curves at an end, (3, c, r), and zeros for time derivatives: only values are linked."""
         slopes = np.zeros((3, 1 + self.curves_count, self.curves_count))
         slopes[0, 1:] = np.eye(self.curves_count)
         return slopes
 
     def with_end(self, x: np.ndarray, end: int, q: np.ndarray) -> np.ndarray:
         """Return x with given joint positions at an end, (n or more,)."""
-        met = x.copy()
+        changed = x.copy()
         q = q[: self.joint_map.robot.n]
-        met[self.end_pattern(end)] = self.joint_map.coordinates(self.ends[end], q)[1:]
-        return met
+        changed[self.end_pattern(end)] = self.joint_map.coordinates(self.ends[end], q)[
+            1:
+        ]
+        return changed
 
     def end_pattern(self, end: int) -> np.ndarray:
         """Return the indices, (r,), of the variables that are the redundant curves' values at an end (0 or -1)."""

@@ -21,7 +21,7 @@ class PathProgram(PhaseSequence[PathPhase]):
     ----------
     phases : sequence of PathPhase
     links : sequence of Link
-        Links between phases. Links of curves link only values here.
+        Links between phases. Only their values are linked here.
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
@@ -29,7 +29,7 @@ class PathProgram(PhaseSequence[PathPhase]):
         first = self.first_variables
         self.start = np.concatenate([phase.start for phase in self.phases])
         self._links = [
-            replace(link, orders=(0,)) if isinstance(link, CurveLink) else link
+            replace(link, orders=(0,))
             for link in links
             if not (isinstance(link, CurveLink) and link.curves == (0,))
         ]

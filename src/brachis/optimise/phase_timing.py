@@ -24,7 +24,7 @@ _MOST_PLACES = 40_000
 """Approximate maximum number of places in all pieces together."""
 _ROUGH_AGREEMENT = 1e-3
 """Relative change of the time at which a rough timing ends."""
-_SLOWER = (1.0, 0.999, 0.995, 0.985, 0.97, 0.95, 0.92, 0.85, 0.7)
+_SLOWER = (1.0, 0.999, 0.995, 0.985, 0.97, 0.95, 0.92, 0.85)
 """Factors on the speeds in which phases meet, tried one after the other until the limits allow a timing. A solution
 meets the limits only at its points; on programs of three seams, 0.92 was enough."""
 _LEAST_PLACES = 12
@@ -116,7 +116,6 @@ class PhaseTiming:
         ends: tuple[float, float],
         places: int = PLACES,
         *,
-        boundary: Boundary | None = None,
         is_rough: bool = False,
     ) -> PhaseTiming:
         """Time a joint path; raise UnreachableError if it leaves the joint map.
@@ -130,15 +129,13 @@ class PhaseTiming:
             Path coordinates of both ends.
         places : int, optional
             Minimum number of places at which the path is timed; a third of this number if `is_rough`.
-        boundary : Boundary, optional
-            Conditions at both ends, without free speeds; by default those of the phase, at rest where speeds are free.
         is_rough : bool, optional
             Whether the path is timed only once, at evenly spread places. This gives the time to within 1 %.
         """
         path = phase.joint_map.path
         assert path is not None
         begin, end = ends
-        given = boundary or phase.boundary.with_speeds()
+        boundary = phase.boundary.with_speeds()
         pieces = drop_near(cut(path.knots, begin, end), tolerances.PATH)
         number = len(pieces) - 1
         count = max(places, min(_PLACES_A_PIECE * number, _MOST_PLACES))
@@ -150,14 +147,14 @@ class PhaseTiming:
             course = _lay_finely(phase, course_at, s)
             sdot = None if estimate is None else np.interp(course.p, *estimate)
             timed = TimedCourse(course, phase.joint_map, phase.limits, sdot)
-            return timed, tuple(timed.speeds[[0, -1]] * given.rates)
+            return timed, tuple(timed.speeds[[0, -1]] * boundary.rates)
 
         course, by_length = lay(spread(pieces, -(-count // (3 * number))))
         timing = course.solve(by_length, agreement=_ROUGH_AGREEMENT)
         law = phase.time_law
         duration = None if law is None else law.duration
         if timing is None or is_rough:
-            return cls(course, by_length, given, timing, duration)
+            return cls(course, by_length, boundary, timing, duration)
         # Place stations at equal time steps of this timing.
         t = np.linspace(0.0, timing.t_end, count)
         y, ydot = course.curves(timing, t)
@@ -169,7 +166,8 @@ class PhaseTiming:
         def time_at(s: np.ndarray) -> PhaseTiming:
             """Time the course at path coordinates, (S,)."""
             course, by_length = lay(s, (passed, ydot[:, 0]))
-            return cls(course, by_length, given, course.solve(by_length), duration)
+            solved = course.solve(by_length)
+            return cls(course, by_length, boundary, solved, duration)
 
         return _resolve_ramps(time_at, s)
 
@@ -235,6 +233,6 @@ def time_phases(program: Program, x: np.ndarray) -> list[PhaseTiming | None]:
     for factor in _SLOWER if program.flies else _SLOWER[:1]:
         slower = program.scale_time(x, 1.0 / factor)
         timings = [PhaseTiming.of(*pair) for pair in program.split(slower)]
-        if all(phase_timing and phase_timing.timing for phase_timing in timings):
+        if all(entry is None or entry.timing for entry in timings):
             break
     return timings

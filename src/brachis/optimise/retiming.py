@@ -31,8 +31,8 @@ _MOST_INTERVALS = 256
 """Maximum number of intervals of all redundant curves together. With four curves of 128 intervals, a solve takes half a
 minute and gains only 0.2 %."""
 _LEAST_INTERVALS = 12
-"""Minimum number of intervals in a phase, however short the phase. With 4, solutions of short moves were up to 7 %
-faster than their timings, and programs of three paths took 0.2 % longer."""
+"""Minimum number of intervals in a phase, however short; in moves, before it is divided by `_FEWER_IN_MOVES`. With 4,
+solutions of short moves were up to 7 % faster than their timings, and programs of three paths took 0.2 % longer."""
 _FEWER_IN_MOVES = 3
 """Divisor of the number of intervals in a move, at as many places. No path bends the curves of a move: with 16
 intervals, moves of an iiwa14 round obstacles were as fast as with 4, and took 2 to 4 times as long."""
@@ -63,8 +63,8 @@ class PathEffort:
     options : SolverOptions
         Options of each solve. Limits may be exceeded slightly, because the timing is recomputed.
     known : int, optional
-        Number of intervals with which the given joint paths were found; 0 if they are only guesses. A number that
-        divides into as many for each phase is not tried.
+        Number of intervals with which the given joint paths were found; 0 if they are only guesses. A number is
+        skipped if it gives every phase as many as this one.
     is_rough_before, is_rough_after : bool, optional
         Whether joint paths are timed only roughly before they are improved, and after. For a joint path that is not
         improved, `is_rough_after` applies. A rough timing does not show gains or losses below 1 %.
@@ -271,7 +271,8 @@ def improve_joint_paths(
     Parameters
     ----------
     program : Program
-        Program over any knots. Limits that the phase plane does not cover are left out.
+        Program over any knots, without free speeds; see `Program.at_rest`. Limits that the phase plane does not cover
+        are left out.
     curves : sequence of (S, c) ndarray
         Curves of every phase: s, ascending, and the redundant curves.
     solve : SolverSession
@@ -313,13 +314,14 @@ def improve_joint_paths(
     for count in effort.intervals:
         before = best.t_end
         is_too_large = count * r > _MOST_INTERVALS
-        shares = [timing.t_end / before for timing in best.timings]
-        is_known = effort.known > 0 and all(
-            _share_intervals(count, share) == _share_intervals(effort.known, share)
-            for share in shares
-        )
-        if is_too_large or is_known or not np.isfinite(before) or solve.deadline.passed:
+        if is_too_large or not np.isfinite(before) or solve.deadline.passed:
             break
+        if effort.known and all(
+            _share_intervals(count, timing.t_end / before)
+            == _share_intervals(effort.known, timing.t_end / before)
+            for timing in best.timings
+        ):
+            continue
         best = _better(apart, solve, effort, count, best)
         if not best.is_credible or best.t_end > before * (1.0 - tolerance):
             break
@@ -335,8 +337,7 @@ def _share_intervals(intervals: int, share: float) -> int:
 
 def _divisor_of(phase: Phase) -> int:
     """Return the divisor of the number of intervals: more than 1 only in a move, in which all joints are redundant."""
-    joint_map = phase.joint_map
-    return _FEWER_IN_MOVES if joint_map.r == joint_map.robot.n else 1
+    return _FEWER_IN_MOVES if phase.joint_map.is_move else 1
 
 
 def _better(

@@ -1,7 +1,7 @@
 """The search over a program: joint paths of all its paths, joined by moves, by dynamic programming.
 
 The nodes are joint paths of each path. The price of a move between two of them is its least time in joint space, with
-the limits of the postures at which it ends. The best chains are improved.
+the limits of the postures at which it ends. The best chains become guesses of the program.
 """
 
 from __future__ import annotations
@@ -359,7 +359,7 @@ class _ChainSearch:
     ) -> np.ndarray:
         """Return the least times of moves, s, from the end of each chain to each goal.
 
-        All moves between two options take as long.
+        The time of a move between two options does not depend on its place in the program.
         """
         ends = [chain.options[-1] for chain in chains]
         pairs = list(itertools.product(ends, goals))

@@ -119,7 +119,6 @@ def price_moves(part: Problem, begins: np.ndarray, ends: np.ndarray) -> np.ndarr
     numbers = np.arange(len(middles))
     lengths = step_lengths(part.limits, middles, ends - begins, numbers)
     by_acceleration, by_velocity = lengths
-    reaches = np.sqrt(by_acceleration) < by_velocity
-    highest = np.where(reaches, by_velocity, np.sqrt(by_acceleration))
-    # Without acceleration, as for a move between equal postures, both terms are zero.
-    return highest + by_acceleration / np.maximum(highest, np.finfo(float).tiny)
+    longer = np.maximum(by_velocity, np.sqrt(by_acceleration))
+    # For a move between equal postures, both terms are zero.
+    return longer + by_acceleration / np.maximum(longer, np.finfo(float).tiny)

@@ -16,7 +16,7 @@ candidates that may be the fastest, in one of two ways:
   one of the limits. The solution of the program over time is refined.
 - `_finish_over_path`, for ``intervals: auto`` and limits that the phase plane covers. The program over time improves
   the joint path. Its solution is refined if it is about as fast as the timing of its own joint path; otherwise splines
-  are laid along this timing.
+  are laid along this timing. For a large program they are laid first, unless its solution is much faster.
 
 The coordinates are those of a closed form if the task names its redundant joints. Otherwise they are those of a chart,
 which measures self-motion around a joint path. A prescribed joint path leaves nothing to improve: it is timed, and
@@ -194,7 +194,7 @@ def _finish_over_path(
     """Improve joint paths further over the path, then over time, and follow the faster of the two timings.
 
     The joint path that the program over time improves is kept. The time that its knots cost is regained by splines that
-    are laid along the timing.
+    are laid along the timing. Parts that meet in motion stop over the path; the program over time finds their speeds.
     """
     guess = candidate.guess
     program = candidate.program
@@ -234,8 +234,9 @@ def _finish_over_path(
         return _refine(candidate, replace(solved, reports=reports), session, options)
 
     motions = []
-    for follow in (lay, refine) if is_laid_first else (refine, lay):
-        motion = follow()
+    attempts = (lay, refine) if is_laid_first else (refine, lay)
+    for attempt in attempts:
+        motion = attempt()
         if motion is None:
             continue
         motions.append(motion)

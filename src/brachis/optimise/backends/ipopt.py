@@ -1,4 +1,4 @@
-"""IPOPT, an interior-point method, through the ipyopt wheel. It is used as a second opinion if Uno fails.
+"""IPOPT, an interior-point method, through the ipyopt wheel. It solves large programs, and others if Uno fails.
 
 The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
 """
@@ -15,7 +15,7 @@ from brachis.optimise.backends.protocol import SolverReport, SolveStatus
 
 NAME = "ipopt"
 _RESTORATION = 1
-"""IPOPT's mode in which it ignores the objective, and looks for a feasible point."""
+"""IPOPT's mode in which it ignores the objective and looks for a feasible point."""
 _STATUS = {
     0: SolveStatus.OPTIMAL,
     1: SolveStatus.ACCEPTABLE,
@@ -69,9 +69,9 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     ) -> bool:
         """Tell whether IPOPT may continue after an iteration."""
         monitor.keep(iterate, objective, infeasibility)
-        if mode == _RESTORATION:
-            barrier = np.inf
-        return not monitor.ends_interior(objective, infeasibility, barrier)
+        # Iterates of a restoration do not show whether the solve has settled.
+        gap = np.inf if mode == _RESTORATION else barrier
+        return not monitor.ends_interior(objective, infeasibility, gap)
 
     def clip(bounds: np.ndarray) -> np.ndarray:
         """Convert infinite bounds to IPOPT's form."""

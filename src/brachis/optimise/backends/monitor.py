@@ -138,9 +138,10 @@ class SolveMonitor:
         before = self._recent[first:-patience]
         least = self.options.progress * abs(objective)
         gain = min(before) - min(self._recent[-patience:]) if before else 0.0
-        gains = (abs(gain) if may_rise else gain) > least
+        if may_rise:
+            gain = abs(gain)
         is_feasible = infeasibility <= self._feasible_below
-        self.stagnated = bool(before) and is_feasible and not gains
+        self.stagnated = bool(before) and is_feasible and gain <= least
         return self.stagnated
 
     def ends_interior(
@@ -148,7 +149,8 @@ class SolveMonitor:
     ) -> bool:
         """Tell whether an interior-point method has to stop after an iteration, or has settled.
 
-        It moves away from the bounds first: its iterates are slower than the starting point for some time.
+        Such a method moves away from the bounds first, so its iterates are slower than the starting point for some
+        time. They count only once the barrier parameter is small.
         """
         stop = self.between_iterations(objective)
         violation = infeasibility if barrier <= _SMALL_BARRIER else np.inf

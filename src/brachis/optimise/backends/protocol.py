@@ -109,7 +109,8 @@ class SolverOptions:
     progress : float
         Minimum relative gain of the last iterates over the best earlier iterate; with less, a solve has stagnated.
         Iterates are compared by their objective times 1 + violation. Only those that violate rows by at most 1e-3, or
-        ten times the tolerance, are compared.
+        ten times the tolerance, are compared. Interior-point methods compare only with the `patience` iterates just
+        before, and a rise counts as much as a gain.
     patience : int
         Number of iterates that count as the last iterates.
     acceptable : float
@@ -120,7 +121,8 @@ class SolverOptions:
         Maximum widening of a row's bound, as a fraction of the bound; no more than the tolerance. Used by Uno.
     anywhere : bool
         Whether iterates far from stationarity are compared too. This is suitable if an approximate solution is enough,
-        but not if the solver creeps. Used by Uno; IPOPT always compares all iterates.
+        but not if the solver creeps. Used by Uno; interior-point methods compare all
+        iterates with a small barrier parameter.
     apart : bool
         Whether the solve runs in a separate process, which is ended if it sends nothing for a long time. The process
         takes about 0.07 s to start.
