@@ -14,7 +14,7 @@ from brachis.common.deadline import NEVER
 from brachis.errors import NotInstalledError, PathError, StartError, TaskError
 from brachis.problem.problem import Problem
 from brachis.robot.from_task import robot_for
-from brachis.search.moves import guess_along
+from brachis.search.moves import guess_along, price_moves
 from brachis.search.phase_plane import least_time
 from brachis.search.sampled_paths import FreeSpace, sample_joint_path
 from brachis.task import task_with
@@ -77,6 +77,18 @@ def test_a_joint_that_reaches_its_velocity_limit_keeps_it():
     shortest = angle / VELOCITY + VELOCITY * INERTIA / TORQUE
     assert result.verified
     assert result.t_end == pytest.approx(shortest, rel=1e-3)
+
+
+def test_prices_of_turns_are_their_least_times():
+    task = task_with(
+        robot={"urdf": "unused"}, start=[0.0], end=[1.0], task_space="free"
+    )
+    part = Problem.of(turntable(VELOCITY), task)
+    angles = np.array([[0.0], [0.2], [2.5]])
+    by_torque = 2.0 * np.sqrt(0.2 * INERTIA / TORQUE)
+    by_velocity = 2.5 / VELOCITY + VELOCITY * INERTIA / TORQUE
+    prices = price_moves(part, np.zeros((3, 1)), angles)
+    np.testing.assert_allclose(prices, [0.0, by_torque, by_velocity], rtol=1e-9)
 
 
 def test_a_free_move_is_faster_than_the_straight_joint_line():

@@ -342,12 +342,11 @@ class SolverSession:
         )
         return replace(self, options=path_options)
 
-    def of_size(self, program: NonlinearProgram) -> SolverSession:
-        """Return the session with the solver that is tried first on programs of this size."""
+    def choose_for_large(self, program: NonlinearProgram) -> Solver | None:
+        """Return the solver that is tried first if a program is large; None if the program is not."""
         entries = len(program.x_lower) * len(program.lower)
-        if self.for_large is None or entries <= _LARGE_PROGRAM:
-            return self
-        return replace(self, backend=self.for_large)
+        is_other = self.for_large is not self.backend
+        return self.for_large if is_other and entries > _LARGE_PROGRAM else None
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -381,9 +380,9 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # to keep results small
 
-        of_size = self.of_size(program).backend
-        if isinstance(program, PathProgram) and of_size is not self.backend:
-            solve = partial(solve_with, of_size)
+        for_large = self.choose_for_large(program)
+        if isinstance(program, PathProgram) and for_large:
+            solve = partial(solve_with, for_large)
             # From a motion far from the optimum, a solve with the near values alone far exceeds limits of others.
             goes_on = self._goes_on(program, x)
             report = (

@@ -240,10 +240,9 @@ class PathPhase:
     def with_end(self, x: np.ndarray, end: int, q: np.ndarray) -> np.ndarray:
         """Return x with given joint positions at an end, (n or more,)."""
         changed = x.copy()
-        q = q[: self.joint_map.robot.n]
-        changed[self.end_pattern(end)] = self.joint_map.coordinates(self.ends[end], q)[
-            1:
-        ]
+        posture = q[: self.joint_map.robot.n]
+        curves = self.joint_map.coordinates(self.ends[end], posture)
+        changed[self.end_pattern(end)] = curves[1:]
         return changed
 
     def end_pattern(self, end: int) -> np.ndarray:

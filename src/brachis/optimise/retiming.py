@@ -18,7 +18,6 @@ from brachis.optimise.improve import SolverSession
 from brachis.optimise.links import CurveLink
 from brachis.optimise.path_phase import PathPhase, violation_of_postures
 from brachis.optimise.path_program import PathProgram
-from brachis.optimise.phase import Phase
 from brachis.optimise.phase_timing import PLACES, PhaseTiming
 from brachis.optimise.program import Program
 from brachis.timing import is_left_out
@@ -335,11 +334,6 @@ def _share_intervals(intervals: int, share: float) -> int:
     return max(_LEAST_INTERVALS, int(np.ceil(intervals * share)))
 
 
-def _divisor_of(phase: Phase) -> int:
-    """Return the divisor of the number of intervals: more than 1 only in a move, in which all joints are redundant."""
-    return _FEWER_IN_MOVES if phase.joint_map.is_move else 1
-
-
 def _better(
     program: Program,
     solve: SolverSession,
@@ -352,7 +346,8 @@ def _better(
     for phase, phase_timing in zip(program.phases, best.timings, strict=True):
         count = _share_intervals(intervals, phase_timing.t_end / best.t_end)
         stations = int(_PLACES_AN_INTERVAL * count)
-        count //= _divisor_of(phase)
+        if phase.joint_map.is_move:
+            count //= _FEWER_IN_MOVES
         phases.append(PathPhase(phase, phase_timing, count, stations))
     over_path = PathProgram(phases, program.links)
     report = solve(over_path, over_path.start)

@@ -155,9 +155,8 @@ class _ChainSearch:
 
     def _passable(self, chains: Sequence[_Chain]) -> list[ChainGuess]:
         """Return the guesses of the best distinct chains whose moves get round what is in their way."""
-        count_of_paths = sum(bool(part.task_map.m) for part in self.problem.parts)
-        paths = max(count_of_paths, _PATHS)
-        count = max(1, self.level.in_charts * _PATHS // paths)
+        paths = sum(bool(part.task_map.m) for part in self.problem.parts)
+        count = max(1, self.level.in_charts * _PATHS // max(paths, _PATHS))
         guesses: list[ChainGuess] = []
         blocked: list[PathError] = []
         chosen: list[np.ndarray] = []

@@ -242,6 +242,7 @@ def _solve_from_timings(
     if begun is None:
         return None
     options = replace(session.options, acceptable=_NEARLY)
-    session = replace(session.of_size(begun[0]), options=options)
+    backend = session.choose_for_large(begun[0]) or session.backend
+    session = replace(session, backend=backend, options=options)
     solved = attempt_once(session, *begun, accept_early_end=True)
     return solved if solved.usable else None

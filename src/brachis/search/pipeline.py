@@ -214,7 +214,7 @@ def _finish_over_path(
     # Refining a large program takes ten times as long as laying splines.
     is_laid_first = (
         solved is not None
-        and session.of_size(solved.program) is not session
+        and session.choose_for_large(solved.program) is not None
         and least < (1.0 + _WORTH_REFINING) * solved.t_end
     )
 

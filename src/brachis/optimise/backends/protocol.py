@@ -121,8 +121,8 @@ class SolverOptions:
         Maximum widening of a row's bound, as a fraction of the bound; no more than the tolerance. Used by Uno.
     anywhere : bool
         Whether iterates far from stationarity are compared too. This is suitable if an approximate solution is enough,
-        but not if the solver creeps. Used by Uno; interior-point methods compare all
-        iterates with a small barrier parameter.
+        but not if the solver creeps. Used by Uno; interior-point methods compare all iterates
+        with a small barrier parameter.
     apart : bool
         Whether the solve runs in a separate process, which is ended if it sends nothing for a long time. The process
         takes about 0.07 s to start.
