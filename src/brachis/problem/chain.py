@@ -57,7 +57,7 @@ def key_in_program(
     sections, before : sequence of Section
         The parts, and those of the problem before.
     interval : tuple of float, optional
-        Interval of s in which something is wrong: the message names the part with most of it.
+        Interval of s in which something is wrong: the message names the part in its middle.
     """
     head = key.partition(".")[0]
     if head in ("start", "end"):
@@ -78,12 +78,8 @@ def key_in_program(
     if head in PATH_KEYS and not interval:
         return f"{main.key}.{key}"
     if interval:
-        first, last = interval
-        overlaps = [
-            min(end, last) - max(begin, first)
-            for begin, end in pairwise([0.0, *(part.s_end for part in sections)])
-        ]
-        main = sections[int(np.argmax(overlaps))]
+        middle = np.mean(interval)
+        main = next(section for section in sections if section.s_end >= middle)
     return ": ".join(filter(None, ("program", main.name, key)))
 
 

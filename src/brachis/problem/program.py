@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
@@ -107,8 +107,9 @@ def bind_task(
             _check_meet(before, problem, stretch)
         problems.append(problem)
         sections.append(list(_sections(stretch, problem)))
-    if "free" not in (task.end, stretches[-1].end):
-        _check_end(problems[-1], whole.end, stretches[-1])
+    goal = problems[-1].end
+    if goal is not None and "free" not in (task.end, stretches[-1].end):
+        _check_end(robot, goal, whole.end, stretches[-1])
     is_closed = task.end == "start" and task.start == "free"
     if is_closed:
         _check_meet(problems[-1], problems[0], stretches[0])
@@ -144,15 +145,16 @@ def _in_program(
         raise
 
 
-def _check_end(last: Problem, end: np.ndarray | None, stretch: _Stretch) -> None:
+def _check_end(
+    robot: Robot, goal: np.ndarray, end: np.ndarray | None, stretch: _Stretch
+) -> None:
     """Refuse a last move to a posture other than that at the end."""
-    goal = last.end
     if end is None or np.abs(goal - end).max() > tolerances.WRITTEN:
         raise TaskError(
             "the last move leads to a posture other than the end",
             where=f"{stretch.key}.move",
             allowed="next, which leads to the end; or end: free",
-            hint=posture_hint(last.robot, goal),
+            hint=posture_hint(robot, goal),
         )
 
 
@@ -178,21 +180,19 @@ class _Stretch:
     @property
     def sections(self) -> list[Section]:
         """The parts as sections, before their ends along the path are known."""
-        sections = []
-        for number, part in self.parts:
-            is_on_path = not isinstance(part, MovePart | DwellPart)
-            is_free = getattr(part, "move", None) == NEXT
-            section = Section(
+        return [
+            Section(
                 part.name or "",
                 part.kind,
                 np.nan,
                 part.events,
                 dwell=getattr(part, "dwell", 0.0),
-                key="" if is_free else f"program[{number}]",
-                segments=len(getattr(part, "path", [part])) if is_on_path else 0,
+                key="" if getattr(part, "move", "") == NEXT else f"program[{number}]",
+                segments=len(getattr(part, "path", ()))
+                or int(part.kind in ("approach", "retract")),
             )
-            sections.append(section)
-        return sections
+            for number, part in self.parts
+        ]
 
     @property
     def end(self) -> Posture | str:
@@ -208,12 +208,8 @@ class _Stretch:
     @property
     def wait(self) -> float:
         """Time for which the arm waits at the end, s."""
-        total = 0.0
-        for _, part in reversed(self.parts):
-            if not isinstance(part, DwellPart):
-                break
-            total += part.dwell
-        return total
+        last = takewhile(lambda part: part.kind == "dwell", reversed(self.sections))
+        return sum(part.dwell for part in last)
 
     def goes_on_with(self, stretch: _Stretch) -> bool:
         """Tell whether the only part of another stretch belongs to the same path."""
@@ -338,9 +334,9 @@ def _task_of(
         if approaches:
             changes["path_start"] = _pose(path, 0.0, approaches[0].approach)
             to = tuple(_pose(path, 0.0).position)
-            line = LineSegment(
-                line=LineTo(to=to), stop=True, dwell=_first_wait(stretch)
-            )
+            first = takewhile(lambda part: part.kind != "path", stretch.sections)
+            wait = sum(part.dwell for part in first)
+            line = LineSegment(line=LineTo(to=to), stop=True, dwell=wait)
             changes["path"] = (line, *changes["path"])
         if retracts:
             away = _pose(path, 1.0, retracts[0].retract)
@@ -413,16 +409,6 @@ def _segments(stretch: _Stretch) -> list[SegmentModel]:
             waits = {"stop": True, "dwell": segments[-1].dwell + part.dwell}
             segments[-1] = segments[-1].model_copy(update=waits)
     return segments
-
-
-def _first_wait(stretch: _Stretch) -> float:
-    """Return the time for which the arm waits between the approach and the path, s."""
-    total = 0.0
-    for _, part in stretch.parts:
-        if isinstance(part, PathPart):
-            break
-        total += part.dwell if isinstance(part, DwellPart) else 0.0
-    return total
 
 
 def _pose(path: Path, s: float, back: float = 0.0) -> ToolPose:

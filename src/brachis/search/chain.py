@@ -186,7 +186,7 @@ class _ChainSearch:
             problem = problem.only([option.number for option in options])
         else:
             options.sort(key=lambda option: option.number)
-        guesses = []
+        guesses: list[InitialGuess] = []
         level = replace(self.level, in_charts=1)
         for option, part in zip(options, problem.parts, strict=True):
             guess = option.guess

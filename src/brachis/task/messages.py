@@ -243,19 +243,19 @@ def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     paths = [] if near else _nearest_keys(name, location[:-1], model)
     if paths and _write_location(location, "") not in paths:
         hint = f"This key belongs elsewhere: {' or '.join(paths)}"
-    hint = _KEYS_OF_OTHERS.get(".".join(_names_in(location)[-2:]), hint)
     allowed = None if hint and not near and len(keys) > 12 else ", ".join(keys)
     return "unknown key", name, allowed, hint
 
 
 def _nearest_keys(name: str, location: _Location, model: type[Model]) -> list[str]:
-    """Return the shortest keys that end in a name, below the innermost place around a location that has some."""
-    for end in range(len(location), -1, -1):
-        place = location[:end]
+    """Return the keys that end in a name: the shortest below a location, else one around it, else the shortest."""
+    ends = range(len(location), -1, -1)
+    for place in (location[:end] for end in ends):
         paths = [
             _write_location(place, path)
             for parent in _models_at(place, model)
             for path in key_paths(name, parent)
+            if path == name or place in (location, ())
         ]
         if paths:
             return list(dict.fromkeys(paths))
@@ -336,7 +336,6 @@ _KEYS_OF_OTHERS: Final = {
     "objective": "brachis always minimises the end time",
     "tool": "The frame that follows the path is robot.tool_frame",
     "posture": "To use a named posture, write start: home and postures: {home: [...]}",
-    "move.position": "A move leads to joint positions; a path leads to a pose of the tool",
     "wait": "A wait is {dwell: 0.5}, in s",
     "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
 }

@@ -194,8 +194,8 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: implausible figures cause errors. false: they cause warnings. null: only a start or named posture that
-    seems to be in degrees causes an error."""
+    """true: implausible figures cause errors. false: they cause warnings. null: only a posture that seems to be in
+    degrees causes an error."""
 
     @model_validator(mode="before")
     @classmethod

@@ -62,7 +62,7 @@ class Part(Model):
 
     kind: ClassVar[str]
     name: Name | None = None
-    """Name of the part. Null: its kind, and its number among the parts of this kind."""
+    """Name of the part. Null: its kind and number."""
     events: tuple[Mark, ...] = ()
     """Events that are returned with their times."""
 
@@ -361,12 +361,11 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a retract leads away from a path",
                 "a path before it, and a move or nothing after it",
             )
-        begins_elsewhere = isinstance(part, PathPart) and (
-            part.path_reversed or part.path_begin
-        )
-        if begins_elsewhere and not {before, after} <= {"move", None}:
+        travel = ("path_reversed", "path_begin")
+        changed = [name for name in travel if getattr(part, name, False)]
+        if changed and not {before, after} <= {"move", None}:
             yield (
-                f"{key}.{'path_begin' if part.path_begin else 'path_reversed'}",
+                f"{key}.{changed[0]}",
                 "a path that begins elsewhere than it is written lies between moves",
                 "a move or nothing on both sides",
             )

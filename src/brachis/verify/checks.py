@@ -5,6 +5,7 @@ This module checks progress, ends, stops and dwells, given speeds of the tool, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -291,10 +292,10 @@ def _check_worst(
     misses: list[float],
     allowed: float,
     unit: str,
-    places: list[tuple[str, float | None]],
+    places: Sequence[tuple[str, float | None]],
 ) -> Check:
     """Check the largest of several deviations, each with its subject and time."""
-    worst = np.argmax(misses)
+    worst = int(np.argmax(misses))
     return Check(name, misses[worst], allowed, unit, *places[worst])
 
 
