@@ -522,6 +522,15 @@ def test_an_approach_out_of_reach_is_named(part, name):
         brachis.plan("iiwa14", **{**CYCLE, "program": program})
 
 
+def test_a_blocked_move_is_named(monkeypatch):
+    def blocked(*_):
+        raise PathError("no way", where="task_space: free")
+
+    monkeypatch.setattr("brachis.search.chain.move_guesses", blocked)
+    with pytest.raises(PathError, match=r"^program: move 1: no way"):
+        brachis.plan(GANTRY_CYCLE)
+
+
 def test_segments_in_place_of_parts_are_explained():
     line = brachis.Line(by=[0.0, 0.3])
     for segments in (line, [line]):
