@@ -245,6 +245,27 @@ def test_a_given_speed_is_held_in_a_program():
     np.testing.assert_allclose(speeds, 0.5, rtol=1e-6)
 
 
+def test_no_joint_swings_on_a_seam_with_a_given_speed():
+    """Without limits on accelerations, the roll of the tool costs no time: it reached 21,000 rad/s^2."""
+    seam = {
+        "path": [{"line": {"by": [0.0, 0.12, 0.0]}, "speed": 0.1}],
+        "path_start": {"position": [0.6, 0.0, 0.4], "rpy_deg": [180, 10, 0]},
+    }
+    result = brachis.plan(
+        "ur10_rail",
+        start=[0.0, 0.0, -1.2, 1.6, -2.0, -1.57, 0.0],
+        task_space="pose_free_roll",
+        program=[{"move": "next"}, seam],
+        **{**QUICK, "least_motion": True},
+    )
+    assert result.verified
+    _, motion = result.trajectory.components[1]
+    accelerations = motion.acceleration(np.linspace(0.0, motion.t_end, 2001))
+    # Each joint reaches its speed on the first and last millimetres.
+    assert np.abs(accelerations).max() < 500.0
+    assert np.sqrt((accelerations**2).mean(axis=0)).max() < 20.0
+
+
 def test_pairs_of_a_body_that_is_there_for_a_time_can_be_left_out():
     post = {"name": "post", "sphere": 0.02, "position": [0.3, 0.2, 0.0]}
     task = {

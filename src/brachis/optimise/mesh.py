@@ -189,8 +189,10 @@ def _choose_intervals(
 ) -> Sequence[np.ndarray]:
     """Choose the intervals that cost the most time, which together cause 60 % of the loss in all phases."""
     x = solved.x
+    program = solved.program
+    has_speeds = any(phase.time_law is not None for phase in program.phases)
     try:
-        losses = [_loss(*pair) for pair in solved.program.split(x)]
+        losses = [_loss(*pair, has_speeds=has_speeds) for pair in program.split(x)]
     except UnreachableError:  # between the collocation points
         return allowed
     mask = np.concatenate(allowed)
@@ -203,10 +205,11 @@ def _choose_intervals(
     return np.split(chosen & mask, ends[:-1])
 
 
-def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
+def _loss(phase: Phase, x: np.ndarray, *, has_speeds: bool) -> np.ndarray:
     """Estimate the time that each interval costs, (N,), s, from the swing of the most active limits.
 
-    As many limits are considered as there are curves. If the duration is given, no time can be lost.
+    As many limits are considered as there are curves. If the duration is given, no time can be lost. Beside a part with
+    a given speed, an interval costs no more than the tool would save at its maximum speed, however the joints swing.
     """
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
@@ -216,22 +219,14 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
     ratios = np.abs(dense.time_scaling_ratios(x))
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :]
     windows = sliding_window_view(slack, samples + 1, axis=0)
-    swing = np.ptp(windows[::samples], axis=2).sum(axis=1)
-    # An interval saves no more time than the tool would at its maximum speed, however the joints swing.
-    rooms = sliding_window_view(_room_of_tool(dense, x), samples + 1)
-    share = np.minimum(swing, rooms[::samples].mean(axis=1))
+    share = np.ptp(windows[::samples], axis=2).sum(axis=1)
+    pairs = zip(dense.limits, dense.evaluate(x).by_limit, strict=True)
+    for limit, values in pairs:
+        if has_speeds and limit.is_of_speed:
+            room = 1.0 - limit.ratio(values).max(axis=1)
+            rooms = sliding_window_view(room, samples + 1)[::samples]
+            share = np.minimum(share, rooms.mean(axis=1))
     return share * np.diff(breaks) * x[0]
-
-
-def _room_of_tool(phase: Phase, x: np.ndarray) -> np.ndarray:
-    """Return the fraction by which the tool is slower than allowed at each point, (K,); 1 without such a limit."""
-    pairs = zip(phase.limits, phase.evaluate(x).by_limit, strict=True)
-    ratios = [
-        limit.ratio(values).max(axis=1)
-        for limit, values in pairs
-        if limit.kind == "tool_speed"
-    ]
-    return 1.0 - np.max(ratios or [np.zeros(len(phase.t_norm))], axis=0)
 
 
 def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:
