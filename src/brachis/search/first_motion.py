@@ -142,21 +142,18 @@ def _improve(
 
     From such a motion, at which no limit is active, an interior-point method makes much progress in a dozen iterations.
     """
-    task = candidate.problem.task
-    backends = [
-        solver for solver in solvers_for(task.solver.name) if solver.is_interior
-    ]
+    name = candidate.problem.task.solver.name
+    backends = [solver for solver in solvers_for(name) if solver.is_interior]
     for backend in backends[:1]:
         if options.deadline.passed:
             break
         program = first.refined.program
         session = SolverSession.for_task(
             backend,
-            task.solver,
+            candidate.problem,
             candidate.guess.joint_map,
             options.deadline.part(_SOLVE_SHARE).within(_LONGEST_SOLVE),
             ignore,
-            has_time_law=any(candidate.problem.time_laws),
         )
         report = session(program, first.refined.x)
         if report.violation < _NEARLY and _ROOM * report.objective < first.t_end:
