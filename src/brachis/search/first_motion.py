@@ -26,7 +26,7 @@ from brachis.optimise.backends import (
     FEASIBLE,
     SolverReport,
     SolveStatus,
-    objective_at,
+    report_point,
     residual,
     solvers_for,
 )
@@ -185,16 +185,14 @@ def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> Solver
         x = changed
         violation = remaining
     is_feasible = violation <= FEASIBLE
-    return SolverReport(
-        solver="nearest motion",
-        status=SolveStatus.ACCEPTABLE if is_feasible else SolveStatus.STALLED,
-        x=x,
-        objective=objective_at(program, x),
-        violation=violation,
-        multipliers=np.zeros(len(program.lower)),
-        iterations=count,
-        wall_time=time.perf_counter() - began,
-        message="a motion within the limits near the joint path",
+    return report_point(
+        "nearest motion",
+        program,
+        x,
+        SolveStatus.ACCEPTABLE if is_feasible else SolveStatus.STALLED,
+        "a motion within the limits near the joint path",
+        time.perf_counter() - began,
+        count,
     )
 
 

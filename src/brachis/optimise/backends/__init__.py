@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from brachis.errors import NotInstalledError, UnknownNameError
 from brachis.optimise.backends import ipopt, uno, uno_interior
 from brachis.optimise.backends.child_process import Solver
-from brachis.optimise.backends.monitor import objective_at, residual
+from brachis.optimise.backends.monitor import objective_at, report_point, residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
     Curvature,
@@ -29,6 +29,7 @@ __all__ = [
     "SolverOptions",
     "SolverReport",
     "objective_at",
+    "report_point",
     "residual",
     "solver_for_large",
     "solvers_for",
