@@ -313,7 +313,6 @@ MECHANISMS = (
         "the task's first solver for large programs over the path",
         {
             _OPTIMISE + "improve.solver_for_large": return_none,
-            _SEARCH + "screening.solver_for_large": return_none,
         },
     ),
     Mechanism(

@@ -23,11 +23,10 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import LastCall, cut, spread
 from brachis.errors import UnreachableError
-from brachis.kernel import CurvePattern, VariableSlopes
+from brachis.kernel import CurvePattern, VariableSlopes, collocation
 from brachis.kinematics import JointState
 from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
-from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
@@ -135,7 +134,7 @@ class PathPhase:
         self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
         self._basis = self._basis_at(self._places)
         self._count = intervals + _DEGREE
-        matrix = basis_matrix(self._knots, _DEGREE, s)
+        matrix = collocation(self._knots, _DEGREE, s)
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
         self.curves_count = len(points)
         self.ends = float(self.breaks[0]), float(self.breaks[-1])
