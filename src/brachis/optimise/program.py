@@ -405,11 +405,8 @@ class Program(PhaseSequence[Phase], Summary):
             phase.with_grid(phase.grid, phase.boundary.with_speeds())
             for phase in self.phases
         ]
-        links = [
-            replace(link, orders=(0,)) if 0 in link.orders else link
-            for link in self.links
-        ]
-        return Program(phases, [link for link in links if 0 in link.orders])
+        links = [replace(link, orders=(0,)) for link in self.links if 0 in link.orders]
+        return Program(phases, links)
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with new collocation points in every phase; see `Phase.with_points`."""
