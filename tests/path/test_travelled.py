@@ -162,7 +162,7 @@ def test_speeds_of_segments_stay_with_their_segments():
         (
             CIRCLE,
             {"path_reversed": True, "start": {"joints": [0] * 7}, "path_start": None},
-            "start of the path, which is missing",
+            "path_start: this key is missing",
         ),
         (
             [{"line": {"to": [0.1] * 7}}],

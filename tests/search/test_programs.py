@@ -11,7 +11,7 @@ import pytest
 import brachis
 from brachis.common.deadline import NEVER
 from brachis.common.progress import ignore
-from brachis.errors import PathError, TaskError
+from brachis.errors import PathError, PlausibilityError, StartError, TaskError
 from brachis.optimise.links import PostureLink
 from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
@@ -22,7 +22,7 @@ from brachis.robot.from_task import robot_for
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.chain import find_batches
 from brachis.search.phase_plane import initial_guess
-from brachis.task import scene_during
+from brachis.task import part_names, scene_during
 from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
@@ -130,6 +130,14 @@ def test_a_cycle_is_verified_and_has_its_parts(cycle):
     assert events["arc_on"] == pytest.approx(seam.begin - 0.02)
     assert events["arc_off"] == pytest.approx(seam.end + 0.01)
     np.testing.assert_allclose(motion.q[[0, -1]], [HOME, HOME], atol=1e-9)
+
+
+def test_checks_name_the_part_to_which_they_belong(cycle):
+    subjects = {check.name: check.subject for check in cycle.verification.checks}
+    for name in ("duration of dwells", "velocity in dwells"):
+        assert subjects[name].endswith(", dwell 1")
+    assert subjects["end velocity"].endswith(", move 1")
+    assert "e-" not in cycle.trajectory.summary()["end posture"]
 
 
 def test_the_tool_is_on_the_seam_and_on_its_approach(cycle):
@@ -241,7 +249,7 @@ def test_pairs_of_a_body_that_is_there_for_a_time_can_be_left_out():
     post = {"name": "post", "sphere": 0.02, "position": [0.3, 0.2, 0.0]}
     task = {
         **GANTRY_CYCLE,
-        "scene": [{**post, "until": "payload 4"}],
+        "scene": [{**post, "until": "payload 1"}],
         "collisions": {
             "capsules": "auto",
             "self_collision": False,
@@ -412,7 +420,7 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
         (
             {
-                "scene": [{"sphere": 0.1, "since": "dwell 4", "until": "retract 5"}],
+                "scene": [{"sphere": 0.1, "since": "dwell 1", "until": "retract 1"}],
                 "collisions": {"mode": "avoid"},
             },
             r"scene\[0\].since: the arm does not move",
@@ -420,13 +428,131 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [{"paht": [], "name": "a"}]}, r"key paht; .* mean 'path'"),
         (
             {"program": [{"move": "next"}, {"approach": 0.1}, {"path": SEAM["path"]}]},
-            r"program\[2\]: path_start",
+            r"program\[2\].path_start: this key is missing: .*convention$",
+        ),
+        ({"program": []}, "program: the program is empty"),
+        (
+            {"program": [{"move": "next", "velocity": 1.0}, SEAM]},
+            r"belongs elsewhere: program\[0\].limits.velocity$",
+        ),
+        (
+            {"program": [{"move": "next"}, {**SEAM, "tolerance": 0.01}]},
+            r"program\[1\].tolerance: unknown key.*mean 'tolerances'",
+        ),
+        ({"program": [SEAM, {"wait": 0.1}]}, "key wait; .*dwell: 0.5"),
+        ({"program": [[SEAM]]}, "Leave out the brackets"),
+        (
+            {"program": [SEAM["path"][0]]},
+            r"keys line; .* belongs in path: write \{path: \{line: ...\}\}",
+        ),
+        (
+            {"program": [{**SEAM, "path_begin": "free"}, {"retract": 0.1}]},
+            r"program\[0\].path_begin: seam: a path that begins elsewhere",
+        ),
+        (
+            {"program": [{"dwell": 0.1}, SEAM]},
+            "dwell 1: the arm waits before it has moved; found a mapping with the keys dwell;",
+        ),
+        (
+            {"program": [SEAM, {"move": "next"}], "end": "free"},
+            r"program\[1\].move: move 1: the last move",
+        ),
+        (
+            {"program": [{"move": "next"}, SEAM, {"move": {"joints": [0.1] * 7}}]},
+            r"program\[2\].move: the last move leads to a posture other than the end",
         ),
     ],
 )
 def test_wrong_programs_are_refused(changes, text):
     with pytest.raises(TaskError, match=text):
         brachis.plan("iiwa14", **{**CYCLE, **changes})
+
+
+@pytest.mark.parametrize(
+    "program, text",
+    [
+        (
+            [{"move": "next"}, SEAM],
+            "end: the program does not lead back .*Add {move: next} as the last part",
+        ),
+        (
+            [SEAM, {"move": {"joints": HOME}}],
+            r"program\[0\]: seam: the start posture is off the path.*Put {move: next} before it",
+        ),
+        (
+            [SEAM, {"move": {"joints": [0, 45, 0, -90, 0, 60, 0]}}],
+            r"program\[1\].move.joints: .*45 deg are 0.785398 rad",
+        ),
+    ],
+)
+def test_wrong_postures_are_named_by_their_parts_with_advice_that_works(program, text):
+    free = "free" if "45 deg" in text else HOME
+    with pytest.raises(StartError, match=text):
+        brachis.plan("iiwa14", **{**CYCLE, "start": free, "program": program})
+    move = {"move": "next"}
+    mended = [*program, move] if "Add" in text else [move, *program]
+    if "45 deg" not in text:
+        start = {"joints": HOME}
+        content = {**CYCLE, "start": start, "program": mended}
+        task = brachis.load_task({"brachis": 1, "robot": {"urdf": "iiwa14"}, **content})
+        assert bind_task(robot_for(None, task.robot), task)
+
+
+def test_degrees_of_a_last_move_are_refused_like_those_of_a_start():
+    """Of a joint without a range, which may turn that far."""
+    robot = brachis.Robot.from_urdf(brachis.robots.path_of("scara3"))
+    free = {joint: [None, None] for joint in robot.joint_names}
+    moves = [{"move": {"joints": [0, 45, 0]}}]
+    with pytest.raises(PlausibilityError, match=r"program\[0\].move.joints.*degrees"):
+        brachis.plan(
+            "scara3",
+            start=[0.0] * 3,
+            program=moves,
+            limits={"position": free},
+            gravity=[0, 0, 0],
+        )
+
+
+@pytest.mark.parametrize("part, name", [("approach", 1), ("retract", 1)])
+def test_an_approach_out_of_reach_is_named(part, name):
+    sides = [[{"move": "next"}], [{"move": {"joints": HOME}}]]
+    sides[part == "retract"].insert(-1 if part == "retract" else 1, {part: 1.2})
+    program = [*sides[0], SEAM, *sides[1]]
+    with pytest.raises(PathError, match=f"program: {part} {name}: path, s in"):
+        brachis.plan("iiwa14", **{**CYCLE, "program": program})
+
+
+def test_a_blocked_move_is_named(monkeypatch):
+    def blocked(*_):
+        raise PathError("no way", where="task_space: free")
+
+    monkeypatch.setattr("brachis.search.chain.move_guesses", blocked)
+    with pytest.raises(PathError, match=r"^program: move 1: no way"):
+        brachis.plan(GANTRY_CYCLE)
+
+
+def test_segments_in_place_of_parts_are_explained():
+    line = brachis.Line(by=[0.0, 0.3])
+    for segments in (line, [line]):
+        with pytest.raises(TaskError, match=r"found Line\(by=.*write {path: {line"):
+            brachis.Program(segments)
+    assert brachis.Program({"path": {"line": {"by": [0.0, 0.3]}}})[0].path == (line,)
+
+
+def test_parts_without_names_are_numbered_by_kind():
+    names = part_names(
+        brachis.Program([SEAM, {"dwell": 1}, SEAM | {"name": None}, {"dwell": 1}])
+    )
+    assert names == ["seam", "dwell 1", "path 2", "dwell 2"]
+
+
+def test_keys_of_segments_are_those_of_the_part():
+    """Its approach is the first segment of the path that is planned."""
+    line = {"line": {"by": [0.1, 0.0, 0.0]}}
+    paths = [SEAM, {"path": [{**line, "blend": 9.0}, line]}]
+    program = [{"move": "next"}, {"approach": 0.05}, *paths, {"move": "next"}]
+    with pytest.raises(PathError, match=r"program\[3\].path\[0\].blend"):
+        brachis.plan("iiwa14", **{**CYCLE, "program": program})
 
 
 def test_a_move_from_nowhere_is_refused():

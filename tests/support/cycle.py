@@ -29,5 +29,5 @@ CYCLE: dict[str, Any] = {
     ],
 }
 """A plan takes about a second."""
-NAMES = ["move 1", "bead", "dwell 3", "move 5"]
+NAMES = ["move 1", "bead", "dwell 1", "move 2"]
 KINDS = ["move", "path", "dwell", "move"]

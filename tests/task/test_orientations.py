@@ -246,8 +246,8 @@ WRONG_STARTS = [
         "null",
         "pose",
         (
-            r"path_start: the start posture is free, or .*which is missing.*allowed: \{position: \[x, "
-            r"y, z\], ...\} with one of"
+            r"path_start: this key is missing: nothing else states.*allowed: \{position: \[x, "
+            r"y, z\], rpy_deg: \[...\]\}, or another convention"
         ),
     ),
 ]

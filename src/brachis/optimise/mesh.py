@@ -217,7 +217,21 @@ def _loss(phase: Phase, x: np.ndarray) -> np.ndarray:
     slack = 1.0 - np.sort(ratios, axis=1)[:, -len(phase.splines) :]
     windows = sliding_window_view(slack, samples + 1, axis=0)
     swing = np.ptp(windows[::samples], axis=2).sum(axis=1)
-    return swing * np.diff(breaks) * x[0]
+    # An interval saves no more time than the tool would at its maximum speed, however the joints swing.
+    rooms = sliding_window_view(_room_of_tool(dense, x), samples + 1)
+    share = np.minimum(swing, rooms[::samples].mean(axis=1))
+    return share * np.diff(breaks) * x[0]
+
+
+def _room_of_tool(phase: Phase, x: np.ndarray) -> np.ndarray:
+    """Return the fraction by which the tool is slower than allowed at each point, (K,); 1 without such a limit."""
+    pairs = zip(phase.limits, phase.evaluate(x).by_limit, strict=True)
+    ratios = [
+        limit.ratio(values).max(axis=1)
+        for limit, values in pairs
+        if limit.kind == "tool_speed"
+    ]
+    return 1.0 - np.max(ratios or [np.zeros(len(phase.t_norm))], axis=0)
 
 
 def _halve(phase: Phase, chosen: np.ndarray, points: int) -> Phase:

@@ -1,6 +1,12 @@
 """The prescribed path and its first three derivatives with respect to the path coordinate s."""
 
-from brachis.path.build import build_path, check_on_path, path_of
+from brachis.path.build import (
+    OffPathError,
+    build_path,
+    check_on_path,
+    path_of,
+    posture_hint,
+)
 from brachis.path.from_curve import bspline_segment, with_feed_rates
 from brachis.path.legs import Leg, legs_of, with_held_speeds
 from brachis.path.protocol import Curve, PathSample
@@ -10,6 +16,7 @@ from brachis.path.time_law import TimeLaw, time_law_of
 __all__ = [
     "Curve",
     "Leg",
+    "OffPathError",
     "Path",
     "PathSample",
     "TimeLaw",
@@ -20,6 +27,7 @@ __all__ = [
     "legs_of",
     "path_of",
     "path_speed",
+    "posture_hint",
     "time_law_of",
     "with_feed_rates",
     "with_held_speeds",

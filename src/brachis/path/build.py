@@ -402,6 +402,10 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
     return path or build_path(task.path, point, *known)
 
 
+class OffPathError(StartError):
+    """The tool in a given posture is not at the end of the path to which the posture belongs."""
+
+
 def check_on_path(
     task_map: TaskMap, posture: np.ndarray, target: np.ndarray, name: str, where: str
 ) -> None:
@@ -409,7 +413,7 @@ def check_on_path(
 
     Raises
     ------
-    StartError
+    OffPathError
     """
     place = task_map.value(posture)
     miss = np.abs(task_map.difference(place, target))
@@ -418,18 +422,18 @@ def check_on_path(
     if miss[worst] > largest:
         unit = task_map.units[worst]
         distance, allowed = write_apart(miss[worst], largest, digits=3)
-        raise StartError(
+        raise OffPathError(
             f"the {name} posture is off the path",
             where=where,
             found=f"{distance} {unit} off in {task_map.rows[worst]}",
             allowed=f"at most {allowed} {unit}",
             hint=_place_hint(task_map, place, target)
-            or _posture_hint(task_map.robot, posture)
+            or posture_hint(task_map.robot, posture)
             or f"Choose a posture with the tool at the {name} of the path",
         )
 
 
-def _posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
+def posture_hint(robot: Robot, posture: np.ndarray) -> str | None:
     """Return a hint about implausible positions in a posture, (n,), such as degrees; None if all are plausible."""
     ends = robot.limits.both_ways("position")
     joints = zip(posture.tolist(), *ends, robot.position_units, strict=True)

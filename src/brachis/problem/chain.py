@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
+import numpy as np
+
 from brachis.problem.problem import Join, Problem
-from brachis.task import FREE, BoundarySettings, Mark
+from brachis.task import FREE, PATH_KEYS, BoundarySettings, Mark
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,10 @@ class Section:
         Its events.
     dwell : float
         Duration of a dwell, s.
+    key : str
+        Key of the part in the task; empty for a move without a given posture.
+    segments : int
+        Number of its segments of the path.
     """
 
     name: str
@@ -32,6 +39,48 @@ class Section:
     s_end: float
     marks: tuple[Mark, ...]
     dwell: float = 0.0
+    key: str = ""
+    segments: int = 0
+
+
+def key_in_program(
+    key: str,
+    sections: Sequence[Section],
+    before: Sequence[Section] = (),
+    interval: tuple[float, float] | None = None,
+) -> str:
+    """Return a key of the problem of some parts of a program as one of the program, for messages.
+
+    Parameters
+    ----------
+    key : str
+    sections, before : sequence of Section
+        The parts, and those of the problem before.
+    interval : tuple of float, optional
+        Interval of s in which something is wrong: the message names the part in its middle.
+    """
+    head = key.partition(".")[0]
+    if head in ("start", "end"):
+        ends = sections if head == "end" else before
+        moves = [section.key for section in ends if section.kind == "move"]
+        return f"{moves[-1]}.move{key.removeprefix(head)}" if any(moves) else key
+    paths = [section for section in sections if section.kind == "path"]
+    main = (*paths, *sections)[0]
+    segment = re.match(r"path\[(\d+)\]", key)
+    number = int(segment[1]) if segment else -1
+    # A path is checked before its approach is added.
+    for section in paths:
+        if 0 <= number < section.segments:
+            return f"{section.key}.path[{number}]{key.partition(']')[2]}"
+        number -= section.segments
+    if head == "postures":
+        return key
+    if head in PATH_KEYS and not interval:
+        return f"{main.key}.{key}"
+    if interval:
+        middle = np.mean(interval)
+        main = next(section for section in sections if section.s_end >= middle)
+    return ": ".join(filter(None, ("program", main.name, key)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,10 +170,12 @@ class ProblemChain(Problem):
         """The problems whose motions follow one another."""
         return self.chained
 
-    def key_of(self, number: int) -> str:
-        """Return the key of the path of a part, for messages."""
-        names = [part.name for part in self.sections[number] if part.kind == "path"]
-        return f"program: {names[0]}: path" if names else "program"
+    def key_of(
+        self, number: int, key: str, interval: tuple[float, float] | None = None
+    ) -> str:
+        """Return a key of a part, or a place in an interval of its s, as one of the program, for messages."""
+        before = self.sections[number - 1] if number else ()
+        return key_in_program(key, self.sections[number], before, interval)
 
     def with_part(self, number: int, part: Problem) -> Problem:
         """Return the program with another part in place of the part with a number."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,7 +43,11 @@ if TYPE_CHECKING:
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
     """Check the joint positions and tool angles that a task states, in postures and along its paths."""
-    return tuple(issue for part in problem.parts for issue in _places_of_part(part))
+    return tuple(
+        replace(issue, where=problem.key_of(number, issue.where))
+        for number, part in enumerate(problem.parts)
+        for issue in _places_of_part(part)
+    )
 
 
 def _places_of_part(problem: Problem) -> list[Issue]:
@@ -194,11 +199,15 @@ def check_within_reach(problem: Problem) -> None:
     PathError
     """
     for number, part in enumerate(problem.parts):
-        _check_path_within_reach(part, problem.key_of(number))
+        try:
+            _check_path_within_reach(part)
+        except PathError as error:
+            error.where = problem.key_of(number, error.where or "", error.s_interval)
+            raise
 
 
-def _check_path_within_reach(problem: Problem, key: str) -> None:
-    """Refuse the path of a part, which has a key in messages."""
+def _check_path_within_reach(problem: Problem) -> None:
+    """Refuse the path of a part."""
     task_map = problem.task_map
     path = problem.path
     if not task_map.axes:  # a prescribed joint path, or a move
@@ -216,7 +225,6 @@ def _check_path_within_reach(problem: Problem, key: str) -> None:
     raise PathError(
         f"the path is out of reach from s = {beyond[0]:.3g} on{say_how_far(task_map, path, beyond[0])}",
         s_interval=(float(beyond[0]), float(beyond[-1])),
-        where=f"{key}, s in [{beyond[0]:.4g}, {beyond[-1]:.4g}]",
         found=f"{distance} m away from the robot's first joint at s = {s[int(np.argmax(away))]:.3g}",
         allowed=f"at most {largest} m, the length of all links and slides in one line",
         hint=distance_hint(furthest, far)

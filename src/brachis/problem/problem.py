@@ -153,9 +153,11 @@ class Problem(Summary):
         """The problems whose motions follow one another: only this one; see `brachis.problem.chain.ProblemChain`."""
         return (self,)
 
-    def key_of(self, _number: int) -> str:
-        """Return the key of the path of a part, for messages."""
-        return "path"
+    def key_of(
+        self, _number: int, key: str, _interval: tuple[float, float] | None = None
+    ) -> str:
+        """Return a key of a part as one of the task, for messages."""
+        return key
 
     def with_part(self, _number: int, part: Problem) -> Problem:
         """Return the problem with another part in place of the part with a number."""

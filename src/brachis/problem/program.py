@@ -6,17 +6,18 @@ Successive paths with the same settings form one path with stops, and so do a pa
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
 
 from brachis.common import tolerances
-from brachis.errors import PathError, TaskError
-from brachis.path import Path, path_of
+from brachis.errors import InputError, PathError, TaskError
+from brachis.path import OffPathError, Path, path_of, posture_hint
 from brachis.path.rotations import rotation_of
-from brachis.problem.chain import ProblemChain, Section
+from brachis.problem.chain import ProblemChain, Section, key_in_program
 from brachis.problem.problem import Problem
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
@@ -34,7 +35,7 @@ from brachis.task import (
     SpeedTable,
     Task,
     ToolLimits,
-    name_of,
+    part_names,
     path_keys,
     scene_during,
 )
@@ -60,9 +61,13 @@ def bind_task(
     if not task.program:
         return Problem.of(robot, task, own_limits)
     lasting = tuple(body for body in task.scene if body.since == body.until is None)
-    stretches = list(
-        _stretches(task) if task.order == "given" else _free_stretches(task)
-    )
+    parts = [
+        part.model_copy(update={"name": name})
+        for part, name in zip(task.program, part_names(task.program), strict=True)
+    ]
+    named = task.model_copy(update={"program": parts})
+    divide = _stretches if task.order == "given" else _free_stretches
+    stretches = list(divide(named))
     closing = FREE if stretches[-1].flies else 0.0
     boundary = task.boundary.model_copy(
         update={"start_speed": closing, "end_speed": closing}
@@ -88,18 +93,23 @@ def bind_task(
             start_speed=FREE if begins_flying else 0.0,
             end_speed=FREE if ends_flying else 0.0,
         )
-        part_task = _task_of(stretch, changed, task, before, stated)
-        problem = Problem.of(changed, part_task, own_limits).waiting(stretch.wait)
-        tasks = _variants(stretch, part_task, problem.path)
-        variants = [
-            Problem.of(changed, variant, own_limits).waiting(stretch.wait)
-            for variant in tasks
-        ]
+        previous = stretches[number - 1].sections if number else []
+        with _in_program(task, stretch.sections, previous):
+            part_task = _task_of(stretch, changed, task, before, stated)
+            problem = Problem.of(changed, part_task, own_limits).waiting(stretch.wait)
+            tasks = _variants(stretch, part_task, problem.path)
+            variants = [
+                Problem.of(changed, variant, own_limits).waiting(stretch.wait)
+                for variant in tasks
+            ]
         problem = replace(problem, variants=tuple(variants))
         if before is not None:
             _check_meet(before, problem, stretch)
         problems.append(problem)
         sections.append(list(_sections(stretch, problem)))
+    goal = problems[-1].end
+    if goal is not None and "free" not in (task.end, stretches[-1].end):
+        _check_end(robot, goal, whole.end, stretches[-1])
     is_closed = task.end == "start" and task.start == "free"
     if is_closed:
         _check_meet(problems[-1], problems[0], stretches[0])
@@ -111,6 +121,41 @@ def bind_task(
                 allowed="no such limit; verify the motion of the program against it",
             )
     return ProblemChain.of_parts(whole, problems, sections, is_closed=is_closed)
+
+
+@contextmanager
+def _in_program(
+    task: Task, sections: Sequence[Section], before: Sequence[Section]
+) -> Iterator[None]:
+    """Name the keys of the program in errors about some of its parts; `before` are the parts before them."""
+    try:
+        yield
+    except OffPathError as error:
+        error.where = f"{sections[0].key}: {sections[0].name}"
+        advice = "Put {move: next} before it"
+        if "end" in error.problem:
+            error.where = "end"
+            back = "back to its start" if task.end == "start" else "to its end"
+            error.problem = f"the program does not lead {back} posture"
+            advice = "Add {move: next} as the last part"
+        error.put_advice(advice)
+        raise
+    except InputError as error:
+        error.where = key_in_program(error.where or "", sections, before)
+        raise
+
+
+def _check_end(
+    robot: Robot, goal: np.ndarray, end: np.ndarray | None, stretch: _Stretch
+) -> None:
+    """Refuse a last move to a posture other than that at the end."""
+    if end is None or np.abs(goal - end).max() > tolerances.WRITTEN:
+        raise TaskError(
+            "the last move leads to a posture other than the end",
+            where=f"{stretch.key}.move",
+            allowed="next, which leads to the end; or end: free",
+            hint=posture_hint(robot, goal),
+        )
 
 
 @dataclass
@@ -133,6 +178,23 @@ class _Stretch:
         return f"program[{number}]"
 
     @property
+    def sections(self) -> list[Section]:
+        """The parts as sections, before their ends along the path are known."""
+        return [
+            Section(
+                part.name or "",
+                part.kind,
+                np.nan,
+                part.events,
+                dwell=getattr(part, "dwell", 0.0),
+                key="" if getattr(part, "move", "") == NEXT else f"program[{number}]",
+                segments=len(getattr(part, "path", ()))
+                or int(part.kind in ("approach", "retract")),
+            )
+            for number, part in self.parts
+        ]
+
+    @property
     def end(self) -> Posture | str:
         """Posture at the end; ``free`` if the planner chooses it."""
         moves = self.of(MovePart)
@@ -146,12 +208,8 @@ class _Stretch:
     @property
     def wait(self) -> float:
         """Time for which the arm waits at the end, s."""
-        total = 0.0
-        for _, part in reversed(self.parts):
-            if not isinstance(part, DwellPart):
-                break
-            total += part.dwell
-        return total
+        last = takewhile(lambda part: part.kind == "dwell", reversed(self.sections))
+        return sum(part.dwell for part in last)
 
     def goes_on_with(self, stretch: _Stretch) -> bool:
         """Tell whether the only part of another stretch belongs to the same path."""
@@ -240,7 +298,6 @@ def _task_of(
     if not stretch.of(LimitedPart):
         raise TaskError(
             "the payload or the scene changes between a path and its approach or retract",
-            where=stretch.key,
             allowed="a path in place of the approach or retract",
         )
     task = task.with_scene(stretch.scene)
@@ -266,27 +323,27 @@ def _task_of(
     if (approaches or retracts or is_open) and _has_places(changes["tool_limits"]):
         raise TaskError(
             "values of s are not those of the path alone with an approach, a retract or a travel that is free",
-            where=f"{stretch.key}.tool_limits",
+            where="tool_limits",
             allowed="speed in the segments of the path",
         )
     if approaches or retracts:
         free = {"end": "free", "start": "free" if approaches else stated["start"]}
         plain = task.model_copy(update=changes | free)
         _, task_map = bind(robot, plain.task_space, plain.tolerances)
-        path = path_of(task_map, validate(Task, plain, stretch.key))
+        path = path_of(task_map, validate(Task, plain, ""))
         if approaches:
-            changes["path_start"] = _pose(path, 0.0, approaches[0].approach, stretch)
+            changes["path_start"] = _pose(path, 0.0, approaches[0].approach)
             to = tuple(_pose(path, 0.0).position)
-            line = LineSegment(
-                line=LineTo(to=to), stop=True, dwell=_first_wait(stretch)
-            )
+            first = takewhile(lambda part: part.kind != "path", stretch.sections)
+            wait = sum(part.dwell for part in first)
+            line = LineSegment(line=LineTo(to=to), stop=True, dwell=wait)
             changes["path"] = (line, *changes["path"])
         if retracts:
-            away = _pose(path, 1.0, retracts[0].retract, stretch)
+            away = _pose(path, 1.0, retracts[0].retract)
             stopping = segments[-1].model_copy(update={"stop": True})
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
-    return validate(Task, task.model_copy(update=changes), stretch.key)
+    return validate(Task, task.model_copy(update=changes), "")
 
 
 def _variants(stretch: _Stretch, task: Task, path: Path) -> Iterator[Task]:
@@ -354,19 +411,7 @@ def _segments(stretch: _Stretch) -> list[SegmentModel]:
     return segments
 
 
-def _first_wait(stretch: _Stretch) -> float:
-    """Return the time for which the arm waits between the approach and the path, s."""
-    total = 0.0
-    for _, part in stretch.parts:
-        if isinstance(part, PathPart):
-            break
-        total += part.dwell if isinstance(part, DwellPart) else 0.0
-    return total
-
-
-def _pose(
-    path: Path, s: float, back: float = 0.0, stretch: _Stretch | None = None
-) -> ToolPose:
+def _pose(path: Path, s: float, back: float = 0.0) -> ToolPose:
     """Return a pose of a path, in its frame, moved back along the tool's z axis.
 
     Raises
@@ -380,7 +425,6 @@ def _pose(
     if len(target) != _PLACES + 9:
         raise PathError(
             "an approach or a retract needs a path that prescribes the direction of the tool",
-            where=None if stretch is None else stretch.key,
             allowed="task_space: pose or pose_free_roll",
         )
     rotation = target[_PLACES:].reshape(3, 3)
@@ -396,16 +440,10 @@ def _sections(stretch: _Stretch, problem: Problem) -> Iterator[Section]:
     stopping = [number for number, segment in enumerate(segments) if segment.stop]
     count = 0
     s_end = 0.0
-    for number, part in stretch.parts:
-        if isinstance(part, PathPart):
-            count += len(part.path)
-        elif not isinstance(part, DwellPart):
-            count += 1
-        if not isinstance(part, DwellPart):
-            is_last = count >= len(segments)
-            s_end = (
-                1.0 if is_last else float(problem.path.stops[stopping.index(count - 1)])
-            )
-        dwell = part.dwell if isinstance(part, DwellPart) else 0.0
-        name = name_of(part, number + 1)
-        yield Section(name, part.kind, s_end, part.events, dwell)
+    for section in stretch.sections:
+        count += section.segments
+        if section.kind == "move" or count >= len(segments):
+            s_end = 1.0
+        elif section.segments:
+            s_end = float(problem.path.stops[stopping.index(count - 1)])
+        yield replace(section, s_end=s_end)

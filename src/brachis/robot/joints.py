@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from brachis.common.arrays import clear_rounding
 from brachis.task import LIMIT_KINDS
 
 TURN = 2.0 * np.pi
@@ -63,7 +64,10 @@ def write_values(
 ) -> str:
     """Write the values of a joint quantity, (n,), with their units."""
     units = [UNITS[quantity][unit] for unit in position_units]
-    numbers = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
+    numbers = [
+        f"{value:.4g}" if np.isfinite(value) else "none"
+        for value in clear_rounding(values)
+    ]
     if len(set(units)) == 1:
         return f"{', '.join(numbers)} {units[0]}"
     pairs = zip(numbers, units, strict=True)

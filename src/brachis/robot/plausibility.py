@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -101,7 +102,7 @@ def refuse_issues(
     ----------
     issues : tuple of Issue
     strict : bool or None
-        Whether issues are errors. If None, only issues of the start posture and of named postures are errors.
+        Whether issues are errors. If None, only issues of postures are errors.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def refuse_issues(
         str(issue)
         for issue in joined
         if strict
-        or (strict is None and issue.where.startswith(("start.joints", "postures.")))
+        or (strict is None and re.search(r"\.joints\b|^postures\.", issue.where))
     ]
     if refused:
         raise PlausibilityError(refused)

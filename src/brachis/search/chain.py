@@ -186,14 +186,19 @@ class _ChainSearch:
             problem = problem.only([option.number for option in options])
         else:
             options.sort(key=lambda option: option.number)
-        guesses = []
+        guesses: list[InitialGuess] = []
         level = replace(self.level, in_charts=1)
         for option, part in zip(options, problem.parts, strict=True):
             guess = option.guess
             if guess is None:
                 start, end = option.ends
                 move = replace(part, start=start, end=end)
-                guess = move_guesses(move, level, self.deadline, self.listener)[0]
+                try:
+                    guess = move_guesses(move, level, self.deadline, self.listener)[0]
+                except PathError as error:
+                    name = problem.sections[len(guesses)][0].name
+                    error.where = f"program: {name}"
+                    raise
             if not part.task_map.m:
                 guess = replace(guess, problem=part)
             guesses.append(guess)
@@ -409,7 +414,8 @@ class _ChainSearch:
             try:
                 of_variant = self._guesses(changed)
             except BrachisError as error:
-                error.where = ": ".join(filter(None, (f"program: {name}", error.where)))
+                interval = getattr(error, "s_interval", None)
+                error.where = self.problem.key_of(number, error.where or "", interval)
                 errors.append(error)
                 continue
             guesses += [replace(guess, problem=variant) for guess in of_variant]

@@ -42,6 +42,7 @@ from brachis.optimise.transcription import program_of
 from brachis.search.by_parts import finish_by_parts
 from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
+from brachis.search.least_motion import find_least_motion
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
 from brachis.search.over_time import (
     improve_timings,
@@ -126,9 +127,7 @@ def finish_candidate(
     program = candidate.program
     is_divided = len(candidate.problem.flights) > 1
     if is_divided and not (is_timing_all(program) or program.means):
-        finish_part = partial(
-            finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
-        )
+        finish_part = partial(_finish_part, deadline=deadline, listener=listener)
         return finish_by_parts(candidate, finish_part)
     is_followed = follows_timing(candidate.guess, candidate.program)
     is_short = is_followed and deadline.left < LITTLE_TIME
@@ -139,6 +138,22 @@ def finish_candidate(
         return finish(candidate, session, options, to_beat)
     except UnreachableError as error:
         return fail(candidate, str(error))
+
+
+def _finish_part(
+    candidate: RankedCandidate, deadline: Deadline, listener: Listener
+) -> Candidate:
+    """Finish a part of a program by itself, with the smoothest motion that is as fast if the task asks for it."""
+    finished = finish_candidate(candidate, Marks(), deadline, listener)
+    is_smoothed = candidate.problem.task.search.least_motion
+    if not (is_smoothed and isinstance(finished, FinishedCandidate)):
+        return finished
+    smoothest = find_least_motion(finished, deadline, listener)
+    return replace(
+        finished,
+        trajectory=smoothest.trajectory,
+        verification=smoothest.verification,
+    )
 
 
 def _finish_over_time(

@@ -29,6 +29,7 @@ from brachis.task.orientation import (
 from brachis.task.paths import Posture
 from brachis.task.point_data import FitReport, FitTolerance, PointFile
 from brachis.task.program import (
+    PATH_KEYS,
     ApproachPart,
     DwellPart,
     LimitedPart,
@@ -37,7 +38,6 @@ from brachis.task.program import (
     PathPart,
     PayloadPart,
     RetractPart,
-    name_of,
     part_names,
     path_keys,
     scene_during,
@@ -66,6 +66,7 @@ __all__ = [
     "FREE",
     "FROM_URDF",
     "LIMIT_KINDS",
+    "PATH_KEYS",
     "ROBOT_LIMITS",
     "AlongTangent",
     "ApproachPart",
@@ -110,7 +111,6 @@ __all__ = [
     "fit_path",
     "json_schema",
     "load_task",
-    "name_of",
     "name_task_file",
     "part_names",
     "path_keys",

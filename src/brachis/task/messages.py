@@ -19,6 +19,7 @@ from brachis.task.fields import (
     Model,
     describe_fields,
     plain,
+    required_keys,
 )
 from brachis.task.units import unit_of
 
@@ -85,7 +86,7 @@ def task_error(error: ValidationError, source: str, model: type[Model]) -> TaskE
 def show(value: object) -> str:
     """Return a value as written in a task file, shortened, with its type if the type may be the mistake."""
     if isinstance(value, Model):
-        value = value.model_dump()
+        value = value.model_dump(exclude_unset=True)
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -116,7 +117,7 @@ def _one(places: list[ErrorDetails], source: str, model: type[Model]) -> TaskErr
         key += f" and {len(others)} more"
     return TaskError(
         problem,
-        where=f"{source}: {key}" if key else source,
+        where=": ".join(filter(None, (source, key))),
         **dict(zip(("found", "allowed", "hint"), facts, strict=False)),
     )
 
@@ -236,18 +237,29 @@ def _missing(detail: ErrorDetails, model: type[Model]) -> _Parts:
 def _unknown(detail: ErrorDetails, model: type[Model]) -> _Parts:
     location = detail["loc"]
     name = str(location[-1])
-    above = [
-        _write_location(location[:end], name)
-        for end in range(len(location))
-        if name in _keys_at(location[:end], model)
-    ]
-    paths = above[-1:] or key_paths(name, model)
-    hint = _KEYS_OF_OTHERS.get(name)
+    keys = _keys_at(location[:-1], model)
+    near = suggest(name, keys)
+    hint = near or _KEYS_OF_OTHERS.get(name)
+    paths = [] if near else _nearest_keys(name, location[:-1], model)
     if paths and _write_location(location, "") not in paths:
         hint = f"This key belongs elsewhere: {' or '.join(paths)}"
-    keys = _keys_at(location[:-1], model)
-    allowed = None if hint and len(keys) > 12 else ", ".join(keys)
-    return "unknown key", name, allowed, hint or suggest(name, keys)
+    allowed = None if hint and not near and len(keys) > 12 else ", ".join(keys)
+    return "unknown key", name, allowed, hint
+
+
+def _nearest_keys(name: str, location: _Location, model: type[Model]) -> list[str]:
+    """Return the keys that end in a name: the shortest below a location, else one around it, else the shortest."""
+    ends = range(len(location), -1, -1)
+    for place in (location[:end] for end in ends):
+        paths = [
+            _write_location(place, path)
+            for parent in _models_at(place, model)
+            for path in key_paths(name, parent)
+            if path == name or place in (location, ())
+        ]
+        if paths:
+            return list(dict.fromkeys(paths))
+    return []
 
 
 def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
@@ -256,20 +268,36 @@ def _refusal(detail: ErrorDetails, _model: type[Model]) -> _Parts:
     return facts["problem"], shown, facts["allowed"] or None
 
 
-def _wrong_keys(detail: ErrorDetails, _model: type[Model]) -> _Parts:
+def _wrong_keys(detail: ErrorDetails, model: type[Model]) -> _Parts:
     facts = detail["ctx"]
     content = detail["input"]
-    known = re.findall(r"\w+", facts["allowed"])
-    unknown = (
-        [name for name in content if name not in known]
-        if isinstance(content, Mapping)
-        else []
-    )
+    problem = facts["problem"]
+    allowed = facts["allowed"]
+    shown = show(content)
+    if isinstance(content, list):
+        return problem, shown, allowed, "Leave out the brackets around it"
+    if isinstance(content, Model):
+        shown = _shorten(repr(content))
+        content = content.model_dump(exclude_unset=True)
+    known = re.findall(r"\w+", allowed)
+    models = _models_at(detail["loc"], model)
+    keys = {*known, *_keys_at(detail["loc"], model)}
+    unknown = [
+        name for name in content if isinstance(content, Mapping) and name not in keys
+    ]
     for name in unknown:
         hint = _KEYS_OF_OTHERS.get(name) or suggest(name, known)
         if hint:
-            return facts["problem"], f"the unknown key {name}", facts["allowed"], hint
-    return facts["problem"], show(content), facts["allowed"]
+            return problem, f"the unknown key {name}", allowed, hint
+    for parent in models:
+        for field, annotation in _fields_of(parent).items():
+            for inner in models_in(annotation):
+                needed = required_keys(inner) if issubclass(inner, Model) else ()
+                if needed and {*needed} <= {*unknown}:
+                    value = f"{{{needed[0]}: ...}}"
+                    hint = f"{value} belongs in {field}: write {{{field}: {value}}}"
+                    return problem, shown, allowed, hint
+    return problem, shown, allowed
 
 
 def _describe(detail: ErrorDetails, model: type[Model]) -> _Parts:
@@ -308,6 +336,7 @@ _KEYS_OF_OTHERS: Final = {
     "objective": "brachis always minimises the end time",
     "tool": "The frame that follows the path is robot.tool_frame",
     "posture": "To use a named posture, write start: home and postures: {home: [...]}",
+    "wait": "A wait is {dwell: 0.5}, in s",
     "points": "For a file of points write csv: {file: ...}, for a list of points spline: {through: [...]}",
 }
 """Hints for keys that brachis does not have."""

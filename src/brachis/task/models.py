@@ -194,8 +194,8 @@ class Task(CheckedModel):
     refinement: RefinementSettings = Field(default_factory=RefinementSettings)
     """Refinement of the collocation points."""
     strict: Flag | None = None
-    """true: implausible figures cause errors. false: they cause warnings. null: only a start or named posture that
-    seems to be in degrees causes an error."""
+    """true: implausible figures cause errors. false: they cause warnings. null: only a posture that seems to be in
+    degrees causes an error."""
 
     @model_validator(mode="before")
     @classmethod
@@ -205,6 +205,10 @@ class Task(CheckedModel):
             return content
         if content.get("program"):
             content = with_task_space(content)
+        elif content.get("program") == [] and not (
+            content.get("path") or content.get("task_space") == "free"
+        ):
+            raise refuse("the program is empty", key="program", allowed="parts")
         elif content.get("task_space") == "joints":
             content = {"start": "free", **content}
         return split_path_in_frame(content)
@@ -229,7 +233,7 @@ class Task(CheckedModel):
     def _start_forms(self) -> str:
         """Form of ``path_start`` in this task space, for messages."""
         if self.of_poses:
-            return f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}"
+            return "{position: [x, y, z], rpy_deg: [...]}, or another convention"
         if isinstance(self.task_space, tuple):
             return f"[{', '.join(self.task_space)}]"
         return "a list of all joints"
@@ -245,9 +249,7 @@ class Task(CheckedModel):
             closes = not self.program or self.program[-1].flies
             if any(self.boundary.given_speeds if closes else self.boundary.speeds):
                 yield "boundary", why, "no speeds"
-            yield from find_mistakes(
-                self.program, self.order, self.start, self.end, self.postures
-            )
+            yield from find_mistakes(self.program, self.order, self.start, self.end)
         elif self.path:
             yield from self._mistakes_at_the_start()
             yield from self._mistakes_in_the_path()
@@ -322,7 +324,7 @@ class Task(CheckedModel):
                 )
             yield (
                 "path_start",
-                "the start posture is free, or not at the start of the path, which is missing",
+                "this key is missing: nothing else states where the path begins",
                 self._start_forms,
             )
         if is_free and self.search.guesses == "numeric":
@@ -335,7 +337,7 @@ class Task(CheckedModel):
             yield (
                 "path_start",
                 "a list does not state the convention of the orientation, for example whether w comes first or last",
-                self._start_forms,
+                f"{{position: [x, y, z], ...}} with one of {choices(suffix='_deg')}",
             )
         if is_pose and not self.of_poses:
             yield (

@@ -6,7 +6,10 @@ gap; the arm stops between them.
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -19,6 +22,7 @@ from brachis.task.fields import (
     Mistake,
     Model,
     Name,
+    NonEmpty,
     Number,
     Positive,
 )
@@ -170,7 +174,7 @@ ProgramPart = Annotated[
 class _Parts(Model):
     """The parts of a program."""
 
-    program: tuple[ProgramPart, ...]
+    program: NonEmpty[ProgramPart]
 
 
 def Program(  # noqa: N802  (made like Line and Arc)
@@ -202,18 +206,19 @@ def Program(  # noqa: N802  (made like Line and Arc)
     >>> [part.kind for part in program]
     ['path', 'dwell', 'move']
     """
-    content = {"program": list(parts)}
+    is_single = isinstance(parts, str | Mapping | Model)
+    content = {"program": [parts] if is_single else list(parts)}
     return validate(_Parts, content, "Program").program
 
 
-def name_of(part: Part, number: int) -> str:
-    """Return the name of a part, whose number counts from 1."""
-    return part.name or f"{part.kind} {number}"
-
-
-def part_names(parts: Sequence[Part]) -> list[str]:
-    """Return the names of all parts."""
-    return [name_of(part, number) for number, part in enumerate(parts, 1)]
+def part_names(parts: Iterable[Part]) -> list[str]:
+    """Return the names of all parts; a part without a name is the first, second, ... of its kind."""
+    counts: Counter[str] = Counter()
+    names = []
+    for part in parts:
+        counts[part.kind] += 1
+        names.append(part.name or f"{part.kind} {counts[part.kind]}")
+    return names
 
 
 def scene_during(
@@ -230,20 +235,23 @@ def scene_during(
     return tuple(filter(is_there, scene))
 
 
+PATH_KEYS = (
+    "path",
+    "task_space",
+    "path_start",
+    "path_frame",
+    "path_reversed",
+    "path_begin",
+    "tolerances",
+    "redundant_joints",
+    "branch",
+)
+"""Keys of a task that are those of a part with a path."""
+
+
 def path_keys(part: PathPart) -> dict[str, Any]:
     """Return the keys of a task for the path of a part; what is free is as the path is written."""
-    keys = (
-        "path",
-        "task_space",
-        "path_start",
-        "path_frame",
-        "path_reversed",
-        "path_begin",
-        "tolerances",
-        "redundant_joints",
-        "branch",
-    )
-    values = {key: getattr(part, key) for key in keys}
+    values = {key: getattr(part, key) for key in PATH_KEYS}
     return {key: value for key, value in values.items() if value != "free"}
 
 
@@ -277,26 +285,22 @@ def find_mistakes(
     order: str,
     start: object,
     end: object,
-    postures: Mapping[str, object],
 ) -> Iterator[Mistake]:
-    """Yield the mistakes in a program's parts and in the postures at both ends."""
-    yield from _find_wrong_names(parts)
+    """Yield the mistakes in a program's parts and in the postures at both ends, with the names of the parts."""
+    mistakes = [
+        _find_wrong_names(parts),
+        _find_wrong_order(parts),
+        _find_wrong_start(parts),
+        _find_wrong_flights(parts, is_closed=end == "start"),
+        _find_wrong_end(parts, start, end),
+    ]
     if order == "free":
-        yield from _find_mistakes_if_free(parts)
-        return
-    yield from _find_wrong_order(parts)
-    yield from _find_wrong_start(parts)
-    yield from _find_wrong_flights(parts, is_closed=end == "start")
-    ways = [part for part in parts if part.kind in WAYS]
-    if ways and isinstance(ways[-1], MovePart):
-        yield from _find_wrong_end(ways, start, end, postures)
-
-
-def joints_of(posture: object, postures: Mapping[str, object]) -> object:
-    """Return the joint positions of a posture or of the name of one."""
-    if isinstance(posture, Posture):
-        return posture.joints
-    return postures.get(str(posture), posture)
+        mistakes[1:] = [_find_mistakes_if_free(parts)]
+    names = part_names(parts)
+    for key, problem, allowed in chain.from_iterable(mistakes):
+        number = re.search(r"\d+", key)
+        name = f"{names[int(number[0])]}: " if number else ""
+        yield key, name + problem, allowed
 
 
 def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
@@ -314,28 +318,26 @@ def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
 
 
 def _find_wrong_end(
-    ways: Sequence[Part], start: object, end: object, postures: Mapping[str, object]
+    parts: Sequence[Part], start: object, end: object
 ) -> Iterator[Mistake]:
-    """Yield the mistakes at the end of a program that ends with a move."""
-    goal = getattr(ways[-1], "move", None)
-    begins_anywhere = getattr(ways[0], "move", None) == NEXT and start == "free"
-    if goal == NEXT and end == "free":
+    """Yield the mistakes at the end of a program whose last move leads to no given posture."""
+    ways = [number for number, part in enumerate(parts) if part.kind in WAYS]
+    if not ways or getattr(parts[ways[-1]], "move", None) != NEXT:
+        return
+    key = f"program[{ways[-1]}].move"
+    begins_anywhere = getattr(parts[ways[0]], "move", None) == NEXT and start == "free"
+    if end == "free":
         yield (
-            "program",
+            key,
             "the last move leads to a posture that nothing determines",
             "a posture in this move, or end",
         )
-    elif goal == NEXT and end == "start" and begins_anywhere:
+    elif end == "start" and begins_anywhere:
         yield (
-            "program",
+            key,
             "the last move meets the first one in a posture that nothing determines",
             "a start posture, or a program that begins with a path",
         )
-    elif goal != NEXT and end != "free":
-        stated = start if end == "start" else end
-        if joints_of(goal, postures) == joints_of(stated, postures):
-            return
-        yield "end", "the last move leads to another posture", "free, or that posture"
 
 
 def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
@@ -359,12 +361,11 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a retract leads away from a path",
                 "a path before it, and a move or nothing after it",
             )
-        begins_elsewhere = isinstance(part, PathPart) and (
-            part.path_reversed or part.path_begin
-        )
-        if begins_elsewhere and not {before, after} <= {"move", None}:
+        travel = ("path_reversed", "path_begin")
+        changed = [name for name in travel if getattr(part, name, False)]
+        if changed and not {before, after} <= {"move", None}:
             yield (
-                f"{key}.path_reversed",
+                f"{key}.{changed[0]}",
                 "a path that begins elsewhere than it is written lies between moves",
                 "a move or nothing on both sides",
             )

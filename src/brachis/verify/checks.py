@@ -5,6 +5,7 @@ This module checks progress, ends, stops and dwells, given speeds of the tool, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -142,7 +143,10 @@ def _move_onto(
 
 def check_stops(motion: CheckedMotion) -> list[Check]:
     """Check that a phase ends at every stop, and that the arm is at rest there for the requested time."""
-    stops = [leg for leg in motion.legs if leg.stops]
+    # The longest dwell comes first: of equally good ones, the first is named.
+    stops = sorted(
+        (leg for leg in motion.legs if leg.stops), key=lambda leg: -leg.dwell
+    )
     if not stops:
         return []
     options = motion.options
@@ -155,7 +159,13 @@ def check_stops(motion: CheckedMotion) -> list[Check]:
     ]
     waits = [sum(phase.duration for phase in phases) for phases in dwells]
     off = [abs(wait - leg.dwell) for wait, leg in zip(waits, stops, strict=True)]
-    places = [f"s = {leg.end:g}" for leg in stops]
+    places = [
+        (
+            f"s = {leg.end:g}",
+            min((phase.end for phase in _phases_up_to(motion, leg)), default=None),
+        )
+        for leg in stops
+    ]
     checks = [
         _check_worst("s at stops", misses, options.progress_tolerance, "-", places),
         _check_worst("duration of dwells", off, _DWELL, "s", places),
@@ -227,9 +237,9 @@ def check_process_speed(motion: CheckedMotion) -> list[Check]:
         return [check]
     title = "s where process speeds begin and end"
     misses = [_distance(_nearest_phase(motion, leg), leg) for leg in legs]
-    subjects = [deviation.subject for deviation in deviations]
+    places = [(deviation.subject, deviation.time) for deviation in deviations]
     tolerance = motion.options.progress_tolerance
-    return [check, _check_worst(title, misses, tolerance, "-", subjects)]
+    return [check, _check_worst(title, misses, tolerance, "-", places)]
 
 
 def _worst_deviation(motion: CheckedMotion, leg: Leg) -> Worst:
@@ -278,11 +288,15 @@ def _phases_up_to(motion: CheckedMotion, leg: Leg) -> list[MotionPhase]:
 
 
 def _check_worst(
-    name: str, misses: list[float], allowed: float, unit: str, subjects: list[str]
+    name: str,
+    misses: list[float],
+    allowed: float,
+    unit: str,
+    places: Sequence[tuple[str, float | None]],
 ) -> Check:
-    """Check the largest of several deviations."""
-    worst = np.argmax(misses)
-    return Check(name, misses[worst], allowed, unit, subjects[worst])
+    """Check the largest of several deviations, each with its subject and time."""
+    worst = int(np.argmax(misses))
+    return Check(name, misses[worst], allowed, unit, *places[worst])
 
 
 def check_joints(

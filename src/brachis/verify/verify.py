@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import BrachisWarning, InputError
 from brachis.path import path_of
@@ -161,7 +162,8 @@ def _verify_program(
         )
         verified.append(part)
         for check in part.checks:
-            _keep_worse(worst, place_in_program(trajectory, begin, check))
+            placed = place_in_program(trajectory, begin, check, component.t_end)
+            _keep_worse(worst, placed)
     whole = [
         _check_components(motion),
         *check_progress(motion),
@@ -200,12 +202,17 @@ def _robot_of(component: Trajectory, motion: CheckedMotion) -> Robot:
     return Robot.from_settings(settings, given.source, given.urdf)
 
 
-def place_in_program(trajectory: Trajectory, begin: float, check: Check) -> Check:
+def place_in_program(
+    trajectory: Trajectory, begin: float, check: Check, duration: float = np.inf
+) -> Check:
     """Return a check of a component that begins at a time, s, with its time in the whole motion and its part."""
     if not trajectory.parts:
         return check
     time = begin if check.time is None else begin + check.time
-    names = (part.name for part in trajectory.parts if part.end > time)
+    # A time at which two parts of the component meet belongs to the later one.
+    rounding = tolerances.TIME * trajectory.t_end
+    last = min(time + rounding, begin + duration - rounding)
+    names = (part.name for part in trajectory.parts if part.end > last)
     name = next(names, trajectory.parts[-1].name)
     subject = f"{check.subject}, {name}" if check.subject else name
     return replace(check, time=None if check.time is None else time, subject=subject)

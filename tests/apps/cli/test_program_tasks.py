@@ -24,7 +24,7 @@ def saved(cycle, tmp_path):
 def test_a_plan_prints_its_parts_and_has_them_in_its_json(run, task, tmp_path):
     outcome = run(f"plan {task} --out {tmp_path / 'out'} --no-figures --verbose")
     assert (
-        "planning for 2 joints a program of 5 parts: move 1, bead, dwell 3, payload 4, move 5"
+        "planning for 2 joints a program of 5 parts: move 1, bead, dwell 1, payload 1, move 2"
         in outcome.err
     )
     table = outcome.out.split("parts\n")[1].split("verification")[0]
@@ -45,14 +45,14 @@ def test_a_plan_prints_its_parts_and_has_them_in_its_json(run, task, tmp_path):
 
 def test_inspect_shows_the_parts_and_the_choices_for_the_first_path(run, task):
     text = run(f"inspect {task}").out
-    assert "program: move 1, bead, dwell 3, payload 4, move 5" in text
+    assert "program: move 1, bead, dwell 1, payload 1, move 2" in text
     assert "task space [x, y]: degree of redundancy 0" in text
     assert run(f"inspect {task} --json").data["parts"] == [
         "move 1",
         "bead",
-        "dwell 3",
-        "payload 4",
-        "move 5",
+        "dwell 1",
+        "payload 1",
+        "move 2",
     ]
 
 

@@ -1,12 +1,16 @@
 """Plots, report and viewer show the parts and events of a program, with the limits of each part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from brachis.apps import plots
-from brachis.apps.plots.panels import panels_of
+from brachis.apps.bottleneck import limit_ratios
+from brachis.apps.plots.panels import panels_of, ratio_panel
 from brachis.apps.report import make_report
 from brachis.apps.view import tables
+from brachis.explain.sensitivities import label_of_speed
 from support.cycle import NAMES
 
 
@@ -31,7 +35,7 @@ def test_panels_have_lines_and_names_of_parts_and_events(motion):
     for ax in figure.axes:
         assert lines_at(ax) == pytest.approx(times)
     written = {text.get_text(): text for text in figure.axes[0].texts}
-    assert set(written) == {"process_on", "process_off", *NAMES} - {"dwell 3"}
+    assert set(written) == {"process_on", "process_off", *NAMES} - {"dwell 1"}
     assert written["process_on"].get_rotation() == 90.0
     assert lines_at(plots.plot_timeline(motion).axes[0]) == pytest.approx(times)
 
@@ -62,6 +66,22 @@ def test_limits_of_a_part_hold_only_in_it(motion):
     assert all(np.ndim(curve.upper) == 0 for curve in position.curves)
 
 
+def test_ratios_have_a_line_where_there_is_the_limit_and_names_that_differ(motion):
+    ratios = limit_ratios(motion)
+    (curve,) = ratio_panel(motion, ratios, "tool speed / limit").curves
+    assert curve.name == "tool"
+    assert np.isnan(curve.values[ratios.t < motion.parts[0].end]).all()
+    label = label_of_speed("process speed", 0.2, "")
+    held = replace(label, share="tool speed / limit")
+    more = np.column_stack([ratios.values, np.ones(len(ratios.t))])
+    both = replace(ratios, labels=(*ratios.labels, held), values=more)
+    curves = ratio_panel(motion, both, "tool speed / limit").curves
+    names = [curve.name for curve in curves]
+    assert names == ["tool speed", "tool process speed of 0.2 m/s"]
+    assert curves[0].style != curves[1].style
+    plots.plot_limits(motion)
+
+
 def test_a_report_has_a_table_of_parts_with_their_limits(motion):
     page = make_report(motion)
     assert page.verified
@@ -71,6 +91,7 @@ def test_a_report_has_a_table_of_parts_with_their_limits(motion):
     assert "x_axis velocity (" in rows
     assert "tool speed (" in rows
     assert "<td>line (by [0.1, 0.2]); the tool moves 0." in page.html
+    assert " m in all; prescribed" in page.html
     assert f"<td>process_on at {motion.events[0].time:.4f} s, process_off" in page.html
     assert "prescribed: x, y<" in page.html
     assert "none, then 3 kg at " in page.html
@@ -87,6 +108,6 @@ def test_a_report_of_a_new_plan_has_the_same(cycle):
 def test_the_viewers_tables_name_the_part(motion):
     bead = motion.parts[1]
     now = motion.at(bead.begin + 0.01)
-    assert "part 2 of 4: bead" in tables.state_table(motion, now)
+    assert "part: bead" in tables.state_table(motion, now)
     table = tables.phases_table(motion)
     assert all(f">{name}<" in table for name in NAMES)

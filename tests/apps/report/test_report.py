@@ -222,7 +222,7 @@ def pairs_of(page):
 def test_the_summary_names_robot_path_and_payload(planar, planar_page):
     expected = {
         "robot": "scara3 (robot.urdf)",
-        "path": "line (length 1, angle deg 90); the tool moves 1.000 m; prescribed: x, y",
+        "path": "line (length 1, angle deg 90); the tool moves 1.000 m in all; prescribed: x, y",
         "payload": "none",
         "tool offset": "none",
         "mounting": "at the world's origin, upright",

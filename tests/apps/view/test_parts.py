@@ -56,7 +56,7 @@ def test_bodies_appear_and_disappear_with_the_parts():
     bodies = [
         {"name": "lasting", "sphere": 0.02, "position": [3, 0, 0]},
         {"name": "early", "sphere": 0.02, "position": [3, 1, 0], "until": "bead"},
-        {"name": "late", "sphere": 0.02, "position": [3, 2, 0], "since": "payload 4"},
+        {"name": "late", "sphere": 0.02, "position": [3, 2, 0], "since": "payload 1"},
     ]
     collisions = {"mode": "check", "capsules": "auto"}
     result = brachis.plan({**CYCLE, "scene": bodies, "collisions": collisions})

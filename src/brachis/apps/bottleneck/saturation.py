@@ -37,7 +37,8 @@ class LimitRatios(Summary):
     values : (K, c) ndarray
         Ratios: 1 at the upper limit and -1 at the lower limit. For a position, the ratio is 0 in the middle of the
         range. For a range with only one end, the ratio is 1 minus the distance from this end, rad or m, but at least 0.
-        For a process speed, the ratio is 1 while the tool has this speed, and 0 otherwise.
+        For a process speed, the ratio is 1 while the tool has this speed, and 0 otherwise. NaN in parts of a program
+        that do not have the limit.
     """
 
     t: np.ndarray
@@ -139,7 +140,7 @@ def limit_ratios(
         for limit in same:
             ratios = limit.ratios(moments, t[rows])
             for label, column in zip(limit.labels, ratios.T, strict=True):
-                columns.setdefault(label, np.zeros(len(t)))[rows] = column
+                columns.setdefault(label, np.full(len(t), np.nan))[rows] = column
     for speed in sorted({phase.speed or 0.0 for phase in trajectory.phases} - {0.0}):
         label = label_of_speed(PROCESS_SPEED, speed, PROCESS_SPEED_KEY)
         text = f"the tool is held at its {label.kind}"
@@ -257,7 +258,8 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
     """
     ratios = limit_ratios(motion) if isinstance(motion, Trajectory) else motion
     entries = []
-    for label, column in zip(ratios.labels, ratios.values.T, strict=True):
+    columns = np.nan_to_num(ratios.values).T
+    for label, column in zip(ratios.labels, columns, strict=True):
         active = [
             ActiveInterval(begin, end, side)
             for side, sign in (("lower", -1.0), ("upper", 1.0))
@@ -270,6 +272,11 @@ def saturations(motion: Trajectory | LimitRatios) -> tuple[Saturation, ...]:
         is_drawn = peak > 0.5 and bool(active or np.ptp(column) > 0.05)
         entries.append(Saturation(label, share, peak, is_drawn, tuple(active)))
     return tuple(sorted(entries, key=lambda entry: (-entry.share, -entry.peak)))
+
+
+def write_share(share: float) -> str:
+    """Write a share of the time as a percentage."""
+    return f"{100.0 * share:.0f} %" if share >= 0.01 else "less than 1 %"
 
 
 @dataclass(frozen=True)
@@ -291,7 +298,7 @@ class PhaseLimits:
         """Name the three limits that are active longest."""
         shares = self.shares[:3]
         texts = [
-            f"{label} ({100.0 * share:.0f} % of the time)" for label, share in shares
+            f"{label} ({write_share(share)} of the time)" for label, share in shares
         ]
         return ", ".join(texts) or "none"
 

@@ -381,13 +381,17 @@ def ratio_panel(
     symbol : str, optional
         Title in Matplotlib's mathematical notation, to be used in place of words.
     """
-    subjects = [label.subject for label in ratios.labels]
+    places = [(label.axis, label.subject) for label in ratios.labels]
+    subjects = [
+        label.subject.rstrip(",") if places.count(place) == 1 else str(label)
+        for label, place in zip(ratios.labels, places, strict=True)
+    ]
     order = list(dict.fromkeys((*trajectory.joint_names, *subjects)))
-    peaks = np.abs(ratios.values).max(axis=0)
+    peaks = np.nanmax(np.abs(ratios.values), axis=0)
     chosen = [k for k, label in enumerate(ratios.labels) if label.axis in titles]
     nearest = sorted(chosen, key=lambda k: -peaks[k])[:MOST_CURVES]
     shown = sorted((order.index(subjects[k]), k) for k in nearest)
-    is_signed = ratios.values[:, nearest].min() < 0.0
+    is_signed = np.nanmin(ratios.values[:, nearest]) < 0.0
     lower = -1.0 if is_signed else -np.inf
     curves = [
         PanelCurve(subjects[k], number, ratios.values[:, k], lower, 1.0)

@@ -14,6 +14,7 @@ import yaml
 
 import brachis
 from brachis.apps.bottleneck import THRESHOLD, limits_by_phase
+from brachis.apps.bottleneck.saturation import write_share
 from brachis.apps.plots.panels import Panel, PanelCurve, curves_of
 from brachis.apps.report.motion import ReportedMotion
 from brachis.kinematics import CHART
@@ -69,9 +70,7 @@ def identity(motion: ReportedMotion) -> dict[str, str]:
     tasks = [part for part in components if part.path] or [task]
     spaces = (part.task_space for part in tasks)
     rows = (space if isinstance(space, str) else ", ".join(space) for space in spaces)
-    described = (
-        f"{'; then '.join(map(describe_path, tasks))}; the tool moves {length:.3f} m"
-    )
+    described = f"{'; then '.join(map(describe_path, tasks))}; the tool moves {length:.3f} m in all"
     texts = {"URDF": trajectory.urdf, "task as it stands below": task_text(task)}
     return {
         "robot": name,
@@ -142,7 +141,7 @@ def _file_name(text: str) -> str:
 def what_limits(motion: ReportedMotion) -> str:
     """Name the limits that are active longest in one sentence."""
     shares = [
-        f"{entry.label} ({100.0 * entry.share:.0f} % of the time)"
+        f"{entry.label} ({write_share(entry.share)} of the time)"
         for entry in motion.saturations
         if entry.active
     ]
