@@ -15,7 +15,6 @@ from typing import Any
 from unittest import mock
 
 from brachis.errors import BrachisError
-from brachis.limits.safeguards import MARGIN
 from brachis.optimise.backends.monitor import SolveMonitor
 from brachis.optimise.retiming import FINE, improve_joint_paths
 from brachis.search.over_path import improve_guess, lay_along_timing
@@ -313,7 +312,6 @@ MECHANISMS = (
         "the task's first solver for large programs over the path",
         {
             _OPTIMISE + "improve.solver_for_large": return_none,
-            _SEARCH + "screening.solver_for_large": return_none,
         },
     ),
     Mechanism(
@@ -326,12 +324,6 @@ MECHANISMS = (
         "centred_chart",
         "the chart is not laid anew around the better joint path",
         {_SEARCH + "over_path._centre": return_first},
-    ),
-    Mechanism(
-        "clear_first",
-        "the smallest branch margin from the first solve on",
-        {_SEARCH + "over_time._FIRST_MARGIN": MARGIN},
-        use=_SEARCH + "over_time._solve_clear_first",
     ),
     Mechanism(
         "improve_over_time",

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from brachis import ik
-from brachis.common.arguments import check_callable, check_executor, count
+from brachis.common.arguments import check_executor, check_listener, count
 from brachis.common.deadline import Deadline
 from brachis.common.interrupts import SigintHandler
 from brachis.common.progress import Listener, ignore, report_progress
@@ -153,7 +153,7 @@ def plan(
     >>> again.t_end < result.t_end
     True
     """
-    check_callable(listener, "listener")
+    check_listener(listener)
     ik.check_families(families)
     with (
         use_one_thread(),

@@ -5,9 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.interpolate import BSpline
 
-from brachis.common.arrays import greville
 from brachis.optimise.bspline import (
-    basis_matrix,
     clamped_knots,
     local_basis,
 )
@@ -32,15 +30,10 @@ def test_any_spline_and_its_derivatives(degree, breaks):
         expected = BSpline(knots, coefficients, degree)(t_norm, nu=order)
         curves = np.einsum("kw,kwc->kc", values[order], windows)
         assert_near(curves, expected, 1e-12)
-    t_norm = np.union1d(t_norm, knots)
-    matrix = basis_matrix(knots, degree, t_norm)
-    expected = BSpline(knots, coefficients, degree)(t_norm)
-    assert_near(matrix @ coefficients, expected, 1e-12)
-    assert_near(matrix @ greville(knots, degree), t_norm, 1e-12)
 
 
 def test_times_beyond_the_ends_are_taken_back():
     knots = clamped_knots(3, np.linspace(0.0, 1.0, 6))
-    inside = basis_matrix(knots, 3, np.array([0.0, 1.0]))
-    outside = basis_matrix(knots, 3, np.array([-1e-9, 1.0 + 1e-9]))
-    assert_array_equal(inside, outside)
+    inside = local_basis(knots, 3, np.array([0.0, 1.0]))
+    outside = local_basis(knots, 3, np.array([-1e-9, 1.0 + 1e-9]))
+    assert_array_equal(inside[1], outside[1])

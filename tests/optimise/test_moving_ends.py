@@ -55,8 +55,8 @@ def test_jacobian_equals_differences(phase):
         exact, expected = dense(phase, x), differences(phase, x, 2e-6)
         count = phase._layout.progress.fixed_terms.shape[1]
         kinds = {
-            limit.kind: phase.rows_of(limit).ravel()[comparable_rows(phase, limit, x)]
-            for limit in phase.limits
+            limit.kind: rows.ravel()[comparable_rows(phase, limit, x)]
+            for limit, rows in zip(phase.limits, phase.value_rows, strict=True)
             if not limit.guarantee.is_mean
         }
         kinds["progress"] = np.arange(len(phase.lower) - count, len(phase.lower))

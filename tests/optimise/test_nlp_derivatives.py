@@ -16,7 +16,7 @@ def blocks(program):
     """Rows of every kind of limit in a program of one phase; means come last."""
     (phase,) = program.phases
     result = {limit.kind: program.rows_of(limit).ravel() for limit in phase.limits}
-    progress = sum(rows.size for rows in map(phase.rows_of, phase.limits))
+    progress = sum(rows.size for rows in phase.value_rows)
     lengths = progress + phase.splines[0].free - 1
     result["progress"] = np.arange(progress, lengths)
     if len(phase.grid.total):

@@ -73,7 +73,7 @@ class RodArm:
 def test_scara_is_three_slender_rods(scara_urdf, gravity):
     robot = Robot.from_urdf(scara_urdf, gravity=[0.0, -gravity, 0.0])
     q, qdot, qddot = states(3)
-    exact = dynamics.torque_derivatives(robot, q, qdot, qddot)
+    exact = robot.dynamic_chain.torque_derivatives(q, qdot, qddot)
     expected = np.array(
         [RodArm.torque(*state, gravity) for state in zip(q, qdot, qddot, strict=True)]
     )
@@ -99,7 +99,7 @@ def test_friction_formula():
 def test_derivatives_against_central_differences(pattern, plane):
     robot = planar_robot(pattern, plane, friction=FRICTION, gravity=[1.0, -2.0, -9.81])
     state = states(3)
-    exact = dynamics.torque_derivatives(robot, *state)
+    exact = robot.dynamic_chain.torque_derivatives(*state)
     h = 1e-5
     for place, block in enumerate((exact.q, exact.qdot, exact.qddot)):
         assert np.abs(block).max() > 0.1
@@ -119,8 +119,8 @@ def test_coulomb_derivative_is_finite_far_from_rest():
     robot = planar_robot("RRR", friction={"coulomb": 5.0, "coulomb_velocity": 1e-3})
     q, _, qddot = states(3)
     fast = np.full_like(q, 50.0)
-    by_qdot = dynamics.torque_derivatives(robot, q, fast, qddot).qdot
-    without = dynamics.torque_derivatives(planar_robot("RRR"), q, fast, qddot).qdot
+    by_qdot = robot.dynamic_chain.torque_derivatives(q, fast, qddot).qdot
+    without = planar_robot("RRR").dynamic_chain.torque_derivatives(q, fast, qddot).qdot
     assert np.all(np.isfinite(by_qdot))
     assert_allclose(by_qdot, without, atol=1e-12)
 
@@ -129,7 +129,7 @@ def test_one_joint_alone():
     robot = gantry_robot([(1.0, 0.0, 0.0)])
     state = states(1)
     assert_allclose(dynamics.torque(robot, *state), 2.0 * state[2], atol=1e-12)
-    derivatives = dynamics.torque_derivatives(robot, *state)
+    derivatives = robot.dynamic_chain.torque_derivatives(*state)
     assert_allclose(derivatives.qddot, np.full((12, 1, 1), 2.0))
 
 

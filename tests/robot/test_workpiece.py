@@ -94,7 +94,7 @@ def test_torques_are_those_of_the_whole_tree_in_the_world(carriers, n):
 def test_derivatives_of_torques_are_exact(carriers, n):
     _, robot = cell(carriers, n)
     states = states_of(robot)
-    exact = dynamics.torque_derivatives(robot, *states)
+    exact = robot.dynamic_chain.torque_derivatives(*states)
     for number, slopes in enumerate(exact):
         for joint in range(robot.n):
             ends = []

@@ -59,15 +59,15 @@ def _wrong_type(value: object, where: str, allowed: str) -> InputError:
     return InputError("wrong type", where=where, found=shown, allowed=allowed)
 
 
-def check_callable(value: object, where: str) -> None:
-    """Raise an error unless the value is a function or None.
+def check_listener(listener: object) -> None:
+    """Raise an error unless the listener is a function or None.
 
     Raises
     ------
     InputError
     """
-    if value is not None and not callable(value):
-        raise _wrong_type(value, where, "a function, or None")
+    if listener is not None and not callable(listener):
+        raise _wrong_type(listener, "listener", "a function, or None")
 
 
 def check_executor(value: object) -> None:

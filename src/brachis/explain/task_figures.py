@@ -77,7 +77,7 @@ class Lagrangian:
     def _find_rows(self, program: Program, limits: Iterable[Limit]) -> np.ndarray:
         """Return the numbers of the rows of limits and of all links."""
         of_limits = [program.rows_of(limit).ravel() for limit in limits]
-        end = len(program.lower)
+        end = len(program.lower) - len(program.means)
         of_links = np.arange(end - sum(link.size for link in program.links), end)
         return np.concatenate([*of_limits, of_links])
 

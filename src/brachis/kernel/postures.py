@@ -51,11 +51,6 @@ class Branch(Structured):
     alternatives: int = 1
     answers_of: Formula | None = None
 
-    @property
-    def counts_turns(self) -> bool:
-        """Whether the number of turns matters for any joint, because its range is finite."""
-        return bool(self.ranged.any())
-
     def check_fits(self, n: int, r: int, coordinates: int) -> None:
         """Raise an error if the numbers of joints, redundant joints or task coordinates differ.
 

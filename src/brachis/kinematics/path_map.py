@@ -116,14 +116,12 @@ class PathMap(JointMap):
     def write_answers(self, motion: PathMotion) -> None:
         """Write into a prepared motion the solutions that the kernel cannot compute."""
 
-    def postures(self, y: np.ndarray, *, near: np.ndarray | None = None) -> np.ndarray:
+    def postures(self, y: np.ndarray) -> np.ndarray:
         """Return joint positions, (K, n), for curves y, (K, 1 + r), at successive times.
 
         Parameters
         ----------
         y : (K, 1 + r) ndarray
-        near : (K, n) ndarray, optional
-            Postures known to be close. If they are given, the times may be arbitrary.
 
         Returns
         -------
@@ -131,10 +129,7 @@ class PathMap(JointMap):
             Joint positions; NaN if there is no posture for the curves.
         """
         sample = self.path.sample(y[:, 0])
-        inputs = {"y": y}
-        if near is not None:
-            inputs["near"] = near
-        return self._prepare(inputs, sample).find_postures().copy()
+        return self._prepare({"y": y}, sample).find_postures().copy()
 
     def _prepare(
         self,
@@ -181,7 +176,7 @@ class PathMap(JointMap):
         branch = self.branch_of
         if near is not None:
             inputs["near"] = near
-        elif t is not None and branch is not None and branch.counts_turns:
+        elif t is not None and branch is not None and branch.ranged.any():
             inputs["t"] = t
         motion = self._prepare(inputs, sample)
         fault = motion.evaluate()

@@ -5,8 +5,8 @@ places:
 
 - A joint limit: a row of `brachis.task.LIMIT_KINDS` and its keyword in `LimitKeywords`, both in `task/limit_kinds.py`;
   a class in `JOINT_LIMITS` of `joint.py`; a formula in `JOINT_CHECKS` of `verify/limits/joint.py`.
-- A limit on one figure of the whole robot: a row of `brachis.task.ROBOT_LIMITS` and its keyword; a subclass of
-  `RobotLimit` in `drives.py`; a line in `LIMIT_BUILDERS`; a formula in `DRIVE_CHECKS` of `verify/limits/joint.py`.
+- A limit on one figure of the whole robot: a row of `brachis.task.ROBOT_LIMITS` and its keyword; a class in
+  `drives.py`; a line in `LIMIT_BUILDERS`; a formula in `DRIVE_CHECKS` of `verify/limits/joint.py`.
 - Any other limit of drives, such as ``torque_speed``: a field of `brachis.LimitSpec` with its keyword, and its unit in
   `task/units.py`; a field of `Limits` in `robot/limits.py`, which `resolve_limits`, `with_tool_joints` and `to_spec`
   handle; a line in `robot/masses.py` if it needs masses; a class, a line in `LIMIT_BUILDERS` and a formula.

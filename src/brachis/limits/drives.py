@@ -39,29 +39,27 @@ from brachis.limits.joint import power_partials, powers
 from brachis.limits.protocol import Bound, JointStates, Limit, Partials
 from brachis.robot import Robot
 from brachis.robot.limits import TorqueSpeedCurve
-from brachis.task import LIMIT_KINDS, ROBOT_LIMITS, Task
+from brachis.task import LIMIT_KINDS, Task
 
 
-class RobotLimit(Limit):
-    """The ratio of one figure of the whole robot to its limit; `kind` is a row of `ROBOT_LIMITS`.
+class TotalPowerLimit(Limit):
+    """Limit on the power that all joints together draw from a common supply, or return to it.
 
     Parameters
     ----------
     robot : Robot
     figure : float
-        Maximum magnitude of the figure, in the unit of the row.
+        Maximum magnitude of the power, W.
     """
 
+    kind = "total_power"
     longer_time = "relieves"
-    subject: str
-    """Name, for labels, of the part of the robot to which the figure belongs."""
 
     def __init__(self, robot: Robot, figure: float) -> None:
         self._robot = robot
         self._figure = figure
-        unit = ROBOT_LIMITS[self.kind].unit
         self.labels = (
-            Label(self.subject, self.name, unit, f"robot.limits.{self.kind}"),
+            Label("all joints", self.name, "W", f"robot.limits.{self.kind}"),
         )
         self.lower = -np.ones(1)
         self.upper = np.ones(1)
@@ -70,15 +68,8 @@ class RobotLimit(Limit):
     @classmethod
     def build(cls, robot: Robot, _task: Task) -> Self | None:
         """Build the limit; None if the robot has no such limit."""
-        figure = getattr(robot.limits, cls.kind)
+        figure = robot.limits.total_power
         return cls(robot, figure) if np.isfinite(figure) else None
-
-
-class TotalPowerLimit(RobotLimit):
-    """Limit on the power that all joints together draw from a common supply, or return to it."""
-
-    kind = "total_power"
-    subject = "all joints"
 
     def values(self, motion: JointStates) -> np.ndarray:
         return powers(self._robot, motion).sum(axis=1, keepdims=True) / self._figure

@@ -37,7 +37,7 @@ from brachis.limits.protocol import (
     Partials,
     compute_inset,
 )
-from brachis.robot import Robot, dynamics
+from brachis.robot import Robot
 from brachis.task import LIMIT_KINDS, Task
 
 
@@ -264,13 +264,11 @@ class TorqueRateLimit(_DynamicLimit):
     def quantity_partials(self, motion: JointStates) -> Partials:
         """Differentiate the rates with respect to q and its first three derivatives, (K, n, n) each."""
         exact = motion.torque_derivatives(self._robot)
-
-        def slopes(*states: np.ndarray) -> tuple[np.ndarray, ...]:
-            """Return the derivatives of the torque with respect to q, qdot and qddot, (2 K, n, n) each."""
-            return dynamics.torque_derivatives(self._robot, *states[:3])
-
+        chain = self._robot.dynamic_chain
         states = (motion.q, motion.qdot, motion.qddot, motion.qdddot)
-        q, qdot, qddot = rates(slopes, states)
+        q, qdot, qddot = rates(
+            lambda *states: chain.torque_derivatives(*states[:3]), states
+        )
         return Partials(q, qdot + exact.q, qddot + exact.qdot, exact.qddot)
 
 

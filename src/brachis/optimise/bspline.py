@@ -55,14 +55,6 @@ def locate(breaks: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return interval, (times - breaks[interval]) / np.diff(breaks)[interval]
 
 
-def basis_matrix(knots: np.ndarray, degree: int, t_norm: np.ndarray) -> np.ndarray:
-    """Return the matrix B, (K, N + d). ``B @ control_points`` is the spline at given times; see `local_basis`."""
-    first, values = local_basis(knots, degree, t_norm)
-    matrix = np.zeros((len(first), len(knots) - degree - 1))
-    np.put_along_axis(matrix, first[:, None] + np.arange(degree + 1), values[0], axis=1)
-    return matrix
-
-
 def basis_functions(lengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     """Return value and three derivatives of the basis functions that are nonzero at points.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from brachis.common.arrays import greville, interpolate_columns, spread
 from brachis.errors import UnreachableError
-from brachis.optimise.bspline import basis_matrix
+from brachis.kernel import collocation
 from brachis.optimise.motion import Motion
 from brachis.optimise.phase import Phase
 from brachis.optimise.program import Program
@@ -122,7 +122,7 @@ def fit_curves(
     -------
     (v,) ndarray
     """
-    basis = basis_matrix(phase.knots, phase.degree, t_norm)
+    basis = collocation(phase.knots, phase.degree, t_norm)
     variables = [np.array([duration])]
     spline_targets = targets[:, phase.boundary.law_curves :]
     for spline, values in zip(phase.splines, spline_targets.T, strict=True):

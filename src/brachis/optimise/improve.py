@@ -31,6 +31,7 @@ from brachis.optimise.backends import (
 from brachis.optimise.near_rows import NearRows, solve_near_rows, solve_near_values
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.program import Program
+from brachis.problem.problem import Problem
 from brachis.task import SolverSettings
 
 
@@ -300,18 +301,18 @@ class SolverSession:
     def for_task(
         cls,
         backend: Solver,
-        settings: SolverSettings,
+        problem: Problem,
         joint_map: JointMap,
         deadline: Deadline,
         listener: Listener,
-        *,
-        has_time_law: bool,
     ) -> SolverSession:
         """Create a session with the settings of the task's ``solver`` part.
 
         In charts, and where the time is given, many motions are equally fast. In these cases a solve ends after fewer
         iterates without gain.
         """
+        settings = problem.task.solver
+        has_time_law = any(problem.time_laws)
         iterations = settings.max_iterations
         default = SolverSettings.model_fields["max_iterations"].default
         if settings.name == "auto" and iterations == default:

@@ -23,11 +23,10 @@ import numpy as np
 from brachis.common import tolerances
 from brachis.common.arrays import LastCall, cut, spread
 from brachis.errors import UnreachableError
-from brachis.kernel import CurvePattern, VariableSlopes
+from brachis.kernel import CurvePattern, VariableSlopes, collocation
 from brachis.kinematics import JointState
 from brachis.limits import Limit, Moments
 from brachis.optimise.boundary import LocalBasis
-from brachis.optimise.bspline import basis_matrix
 from brachis.optimise.evaluator import Evaluation, Evaluator
 from brachis.optimise.motion import follow_law
 from brachis.optimise.phase import Phase
@@ -135,7 +134,7 @@ class PathPhase:
         self._knots = np.pad(self.breaks, _DEGREE, mode="edge")
         self._basis = self._basis_at(self._places)
         self._count = intervals + _DEGREE
-        matrix = basis_matrix(self._knots, _DEGREE, s)
+        matrix = collocation(self._knots, _DEGREE, s)
         points = np.linalg.lstsq(matrix, curves[:, 1:], rcond=None)[0].T
         self.curves_count = len(points)
         self.ends = float(self.breaks[0]), float(self.breaks[-1])
@@ -165,10 +164,9 @@ class PathPhase:
         points = np.tile(place, self.curves_count)
         of_curve = np.repeat(curves + 1, columns.size)
         self._pattern = CurvePattern(points, of_curve, places, 1 + self.curves_count)
-        rows = np.arange(places * values).reshape(places, values)
         self.jacobian_columns = np.repeat(variable, values)
         point = np.concatenate([every, every, points])
-        self.jacobian_rows = rows[point].ravel()
+        self.jacobian_rows = self.value_rows[0][point].ravel()
 
     def _set_constants(self) -> None:
         """Set s, s' and s'' at the places, and the slopes of X and u by X at the stations on both sides."""
@@ -331,10 +329,10 @@ class PathPhase:
         return self._bounds[1].ravel()
 
     @property
-    def value_numbers(self) -> np.ndarray:
-        """Number of the limit value to which each row belongs, (c,). It is the same at all places."""
+    def value_rows(self) -> list[np.ndarray]:
+        """Indices of all rows, (L, number of values): at each place, one row for each value."""
         places, values = self._bounds.shape[1:]
-        return np.tile(np.arange(values), places)
+        return [np.arange(places * values).reshape(places, values)]
 
     def time(self, x: np.ndarray) -> float:
         """Return the time of the phase, s."""

@@ -25,66 +25,17 @@ class PathProgram(PhaseSequence[PathPhase]):
     """
 
     def __init__(self, phases: Sequence[PathPhase], links: Sequence[Link]) -> None:
-        super().__init__(phases)
-        first = self.first_variables
-        self.start = np.concatenate([phase.start for phase in self.phases])
-        self._links = [
+        linked = [
             replace(link, orders=(0,))
             for link in links
             if not (isinstance(link, CurveLink) and link.curves == (0,))
         ]
-        if self.phases[0].phase.boundary.periodic and self.phases[0].curves_count:
-            redundant = tuple(range(1, 1 + self.phases[0].curves_count))
-            self._links.append(CurveLink(0, 0, (0,), redundant))
-        row = 0
-        rows = []
-        columns = []
-        patterns = [
-            *(
-                (phase.jacobian_rows, phase.jacobian_columns + column)
-                for phase, column in zip(self.phases, first, strict=True)
-            ),
-            *(link.pattern(self.phases, first) for link in self._links),
-        ]
-        heights = [
-            *(len(phase.lower) for phase in self.phases),
-            *(link.size for link in self._links),
-        ]
-        for (rows_of_block, columns_of_block), height in zip(
-            patterns, heights, strict=True
-        ):
-            rows.append(rows_of_block + row)
-            columns.append(columns_of_block)
-            row += height
-        self.value_numbers = self._number_values()
-        self.jacobian_rows = np.concatenate(rows)
-        self.jacobian_columns = np.concatenate(columns)
-
-    def _number_values(self) -> np.ndarray:
-        """Give each limit value of a phase, and each join, a number; return the number for each row, (c,)."""
-        numbers = []
-        first = 0
-        for phase in self.phases:
-            numbers.append(first + phase.value_numbers)
-            first = 1 + int(numbers[-1].max(initial=first - 1))
-        return np.concatenate([*numbers, first + np.arange(self._joined)])
-
-    @property
-    def _joined(self) -> int:
-        """Number of rows of links."""
-        return sum(link.size for link in self._links)
-
-    @property
-    def lower(self) -> np.ndarray:
-        """Lower bounds of the rows, (c,)."""
-        joined = np.zeros(self._joined)
-        return np.concatenate([*(phase.lower for phase in self.phases), joined])
-
-    @property
-    def upper(self) -> np.ndarray:
-        """Upper bounds of the rows, (c,)."""
-        joined = np.zeros(self._joined)
-        return np.concatenate([*(phase.upper for phase in self.phases), joined])
+        first = phases[0]
+        if first.phase.boundary.periodic and first.curves_count:
+            redundant = tuple(range(1, 1 + first.curves_count))
+            linked.append(CurveLink(0, 0, (0,), redundant))
+        super().__init__(phases, linked)
+        self.start = np.concatenate([phase.start for phase in self.phases])
 
     def narrow(self, x: np.ndarray) -> float:
         """Narrow limits on postures in all phases; see `PathPhase.narrow`."""
@@ -106,13 +57,6 @@ class PathProgram(PhaseSequence[PathPhase]):
     def curvature(self, _x: np.ndarray) -> None:
         """Return None, because no part of the Hessian is known."""
 
-    def rows(self, x: np.ndarray) -> np.ndarray:
-        """Compute the values of the rows, (c,); raise UnreachableError if the joint map has no posture."""
-        parts = self.split(x)
-        rows = [phase.rows(x_of_phase) for phase, x_of_phase in parts]
-        rows += [link.rows(parts) for link in self._links]
-        return np.concatenate(rows)
-
     def meet(self, x: np.ndarray) -> np.ndarray:
         """Return x with the ends of moves exactly where the parts beside them begin or end.
 
@@ -121,20 +65,13 @@ class PathProgram(PhaseSequence[PathPhase]):
         """
         parts = self.split(x)
         met = [x_of_phase for _, x_of_phase in parts]
-        for link in self._links:
+        for link in self.links:
             if isinstance(link, PostureLink):
                 (moved, end), (kept, place) = link.sides(self.phases)
                 phase, x_of_phase = parts[kept]
                 q = phase.state(x_of_phase).q[place, : link.combinations.shape[1]]
                 met[moved] = self.phases[moved].with_end(met[moved], end, q)
         return np.concatenate(met)
-
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Compute the entries of the Jacobian on its pattern, (nnz,); raise as `rows` does."""
-        parts = self.split(x)
-        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in parts]
-        entries += [link.jacobian(parts) for link in self._links]
-        return np.concatenate(entries)
 
     def curves(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return s and the redundant curves of all phases at many places, (S, c) each."""

@@ -324,12 +324,10 @@ class Phase:
         totals = np.full(len(self.grid.total), self._h(x).sum())
         return np.concatenate([*values, self._layout.progress.values(x), totals])
 
-    def rows_of(self, limit: Limit) -> np.ndarray:
-        """Return the indices of the rows of one of the limits, (K, c); empty, (0, c), for a limit on means."""
-        number = next(
-            i for i, candidate in enumerate(self.limits) if candidate is limit
-        )
-        return self._rows.of_limits[number]
+    @property
+    def value_rows(self) -> list[np.ndarray]:
+        """Indices of the rows of each limit, (K, c) for each limit; empty, (0, c), for a limit on means."""
+        return self._rows.of_limits
 
     def mean_weights(self, x: np.ndarray) -> np.ndarray:
         """Return the weights of the collocation points in a mean over the phase's time, (K,)."""

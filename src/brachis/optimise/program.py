@@ -4,8 +4,8 @@
     over        x = the variables of the first phase, then of the second, ...
     subject to  lower <= rows(x) <= upper,   x_lower <= x <= x_upper
 
-First come the rows of the phases, one phase after the other, then the means over the whole motion, then the rows of the
-links. Most motions have one phase and no links; see `phase`. The objective is a sum over the phases.
+First come the rows of the phases, one phase after the other, then the rows of the links, then the means over the whole
+motion. Most motions have one phase and no links; see `phase`. The objective is a sum over the phases.
 """
 
 from __future__ import annotations
@@ -21,51 +21,116 @@ import numpy as np
 from brachis.common.summary import Summary
 from brachis.kinematics import JointState
 from brachis.limits import Bound, Limit, Role
-from brachis.optimise.backends import Curvature
+from brachis.optimise.backends import Curvature, ProgramRows
 from brachis.optimise.evaluator import Evaluation
-from brachis.optimise.links import Link
+from brachis.optimise.links import Link, LinkedPhase
 from brachis.optimise.means import Means
 from brachis.optimise.motion import Motion
 from brachis.optimise.objective import EndTime, Objective
 from brachis.optimise.phase import Phase
 
 
-class _HasVariables(Protocol):
+class _PhaseWithRows(LinkedPhase, ProgramRows, Protocol):
     """A phase of a program over time or over the path."""
 
-    x_lower: np.ndarray
-    x_upper: np.ndarray
+    @property
+    def value_rows(self) -> Sequence[np.ndarray]:
+        """Indices of the rows of the limits' values, (K, c) each; a column belongs to one value."""
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         """Evaluate joint motion and limits at given variables of the phase, (v,)."""
 
 
-_Phase = TypeVar("_Phase", bound=_HasVariables)
+_Phase = TypeVar("_Phase", bound=_PhaseWithRows)
 
 
 class PhaseSequence(Generic[_Phase]):
-    """Successive phases, and the variables of all of them.
+    """Successive phases and the links between them, with the variables and the rows of all of them.
 
     Parameters
     ----------
     phases : iterable of Phase or PathPhase
+    links : iterable of Link
 
     Attributes
     ----------
     phases : tuple of Phase or PathPhase
+    links : tuple of Link
     x_lower, x_upper : (v,) ndarray
         Bounds of the variables.
     first_variables : list of int
         Index of the first variable of each phase.
     """
 
-    def __init__(self, phases: Iterable[_Phase]) -> None:
+    def __init__(self, phases: Iterable[_Phase], links: Iterable[Link]) -> None:
         self.phases = tuple(phases)
+        self.links = tuple(links)
         first = np.cumsum([0, *(len(phase.x_lower) for phase in self.phases)]).tolist()
         self.first_variables = first[:-1]
         self._blocks = [slice(a, b) for a, b in itertools.pairwise(first)]
         self.x_lower = np.concatenate([phase.x_lower for phase in self.phases])
         self.x_upper = np.concatenate([phase.x_upper for phase in self.phases])
+        heights = [len(phase.lower) for phase in self.phases]
+        sizes = [link.size for link in self.links]
+        self._first_rows = np.cumsum([0, *heights, *sizes]).tolist()
+        self._joined = np.zeros(sum(sizes))
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the rows, (c,)."""
+        return np.concatenate([*(phase.lower for phase in self.phases), self._joined])
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the rows, (c,)."""
+        return np.concatenate([*(phase.upper for phase in self.phases), self._joined])
+
+    @cached_property
+    def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the entries of the Jacobian, computed on demand because many programs never need them."""
+        firsts = self.first_variables
+        patterns = [
+            (phase.jacobian_rows, phase.jacobian_columns + first)
+            for phase, first in zip(self.phases, firsts, strict=True)
+        ]
+        patterns += [link.pattern(self.phases, firsts) for link in self.links]
+        pairs = zip(patterns, self._first_rows, strict=False)
+        rows = [rows + first for (rows, _), first in pairs]
+        columns = [columns for _, columns in patterns]
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @property
+    def jacobian_rows(self) -> np.ndarray:
+        """Row of each entry of the Jacobian, (nnz,). Each place occurs once."""
+        return self._pattern[0]
+
+    @property
+    def jacobian_columns(self) -> np.ndarray:
+        """Column of each entry of the Jacobian, (nnz,)."""
+        return self._pattern[1]
+
+    @cached_property
+    def value_numbers(self) -> np.ndarray:
+        """Number of the limit value in each row, (c,), the same at all points of a phase. Other rows have their own."""
+        numbers = np.arange(len(self.lower))
+        for phase, first in zip(self.phases, self._first_rows, strict=False):
+            for rows in phase.value_rows:
+                numbers[first + rows] = first + rows[:1]
+        return numbers
+
+    def rows(self, x: np.ndarray) -> np.ndarray:
+        """Compute the values of the rows, (c,); raise UnreachableError if the joint map has no posture."""
+        phase_points = self.split(x)
+        rows = [phase.rows(x_of_phase) for phase, x_of_phase in phase_points]
+        rows += [link.rows(phase_points) for link in self.links]
+        return np.concatenate(rows)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Compute the entries of the rows' Jacobian on its pattern, (nnz,); raise as `rows` does."""
+        phase_points = self.split(x)
+        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in phase_points]
+        entries += [link.jacobian(phase_points) for link in self.links]
+        return np.concatenate(entries)
 
     def split(self, x: np.ndarray) -> list[tuple[_Phase, np.ndarray]]:
         """Return each phase with its part of x."""
@@ -123,48 +188,29 @@ class Program(PhaseSequence[Phase], Summary):
         links: Sequence[Link] = (),
         objective: Objective | None = None,
     ) -> None:
-        super().__init__(phases)
-        self.links = tuple(links)
+        super().__init__(phases, links)
         self.minimised = objective or EndTime()
         durations = self.first_variables
         longest = np.broadcast_to(self.minimised.longest, len(self.phases))
         self.x_upper[durations] = np.minimum(self.x_upper[durations], longest)
         self.means = Means(self.phases[0].limits)
-        blocks: tuple[Phase | Means, ...] = (*self.phases, self.means)
-        sizes = [link.size for link in self.links]
-        joined = np.zeros(sum(sizes))
-        self.lower = np.concatenate([*(block.lower for block in blocks), joined])
-        self.upper = np.concatenate([*(block.upper for block in blocks), joined])
-        heights = [*(len(block.lower) for block in blocks), *sizes]
-        self._first_rows = np.cumsum([0, *heights]).tolist()
-        first_mean = self._first_rows[len(self.phases)]
-        self._mean_rows = slice(first_mean, first_mean + len(self.means))
+        self._mean_rows = slice(self._first_rows[-1], None)
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of the rows, (c,)."""
+        return np.append(super().lower, self.means.lower)
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of the rows, (c,)."""
+        return np.append(super().upper, self.means.upper)
 
     @cached_property
     def _pattern(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the entries of the Jacobian, computed on demand because many programs never need them."""
-        firsts = self.first_variables
-        patterns = [
-            (phase.jacobian_rows, phase.jacobian_columns + first)
-            for phase, first in zip(self.phases, firsts, strict=True)
-        ]
-        of_means = np.indices((len(self.means), self.variables)).reshape(2, -1)
-        patterns.append((of_means[0], of_means[1]))
-        patterns += [link.pattern(self.phases, firsts) for link in self.links]
-        pairs = zip(patterns, self._first_rows, strict=False)
-        rows = [rows + first for (rows, _), first in pairs]
-        columns = [columns for _, columns in patterns]
-        return np.concatenate(rows), np.concatenate(columns)
-
-    @property
-    def jacobian_rows(self) -> np.ndarray:
-        """Row of each entry of the Jacobian, (nnz,). Each place occurs once."""
-        return self._pattern[0]
-
-    @property
-    def jacobian_columns(self) -> np.ndarray:
-        """Column of each entry of the Jacobian, (nnz,)."""
-        return self._pattern[1]
+        rows, columns = super()._pattern
+        row, column = np.indices((len(self.means), self.variables)).reshape(2, -1)
+        return np.append(rows, self._first_rows[-1] + row), np.append(columns, column)
 
     @property
     def names(self) -> list[str]:
@@ -266,19 +312,11 @@ class Program(PhaseSequence[Phase], Summary):
 
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Compute the values of the rows, (c,); raise UnreachableError as `states` does."""
-        phase_points = self.split(x)
-        rows = [phase.rows(x_of_phase) for phase, x_of_phase in phase_points]
-        rows.append(self.means.values(phase_points))
-        rows += [link.rows(phase_points) for link in self.links]
-        return np.concatenate(rows)
+        return np.append(super().rows(x), self.means.values(self.split(x)))
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Compute the entries of the rows' Jacobian on its sparsity pattern, (nnz,); raise as `states` does."""
-        phase_points = self.split(x)
-        entries = [phase.jacobian(x_of_phase) for phase, x_of_phase in phase_points]
-        entries.append(self.means.slopes(phase_points).ravel())
-        entries += [link.jacobian(phase_points) for link in self.links]
-        return np.concatenate(entries)
+        return np.append(super().jacobian(x), self.means.slopes(self.split(x)))
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
         """Return the part of the Hessian due to squares in the objective and in means; None if there are no squares."""
@@ -316,29 +354,18 @@ class Program(PhaseSequence[Phase], Summary):
         """
         if limit.guarantee.is_mean:
             limits = self.means.limits
-            number = next(i for i, candidate in enumerate(limits) if candidate is limit)
-            before = sum(len(earlier.lower) for earlier in limits[:number])
-            first = self._mean_rows.start + before
+            earlier_limits = limits[: limits.index(limit)]
+            before = sum(len(earlier.lower) for earlier in earlier_limits)
+            first = self._first_rows[-1] + before
             return np.arange(first, first + len(limit.lower))[None]
-        # The rows of the links come last.
         pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(
             [
-                first + phase.rows_of(limit)
+                first + phase.value_rows[phase.limits.index(limit)]
                 for phase, first in pairs
-                if any(candidate is limit for candidate in phase.limits)
+                if limit in phase.limits
             ]
         )
-
-    @cached_property
-    def value_numbers(self) -> np.ndarray:
-        """Number of the limit value in each row, (c,), the same at all points of a phase. Other rows have their own."""
-        numbers = np.arange(len(self.lower))
-        for phase, first in zip(self.phases, self._first_rows, strict=False):
-            for limit in phase.limits:
-                rows = first + phase.rows_of(limit)
-                numbers[rows] = rows[:1]
-        return numbers
 
     @cached_property
     def third_order_rows(self) -> list[int]:
@@ -347,9 +374,9 @@ class Program(PhaseSequence[Phase], Summary):
         return [
             int(first + row)
             for phase, first in pairs
-            for limit in phase.limits
+            for limit, rows in zip(phase.limits, phase.value_rows, strict=True)
             if limit.order > 2
-            for row in phase.rows_of(limit).ravel()
+            for row in rows.ravel()
         ]
 
     def motions(self, x: np.ndarray) -> list[Motion]:
@@ -378,11 +405,8 @@ class Program(PhaseSequence[Phase], Summary):
             phase.with_grid(phase.grid, phase.boundary.with_speeds())
             for phase in self.phases
         ]
-        links = [
-            replace(link, orders=(0,)) if 0 in link.orders else link
-            for link in self.links
-        ]
-        return Program(phases, [link for link in links if 0 in link.orders])
+        links = [replace(link, orders=(0,)) for link in self.links if 0 in link.orders]
+        return Program(phases, links)
 
     def with_points(self, t_norm: Sequence[np.ndarray]) -> Program:
         """Return the same program with new collocation points in every phase; see `Phase.with_points`."""

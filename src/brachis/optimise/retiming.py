@@ -132,32 +132,6 @@ FINE = PathEffort(
 """Effort for a plan that starts from the result of a rough search."""
 
 
-def keep(program: Program, x: np.ndarray) -> SolverReport:
-    """Report x unchanged. More collocation points do not improve a timing, but limits can be met with more time."""
-    return _report(program, x, SolveStatus.STALLED, np.inf, 0.0)
-
-
-def _report(
-    program: Program,
-    x: np.ndarray,
-    status: SolveStatus,
-    violation: float,
-    seconds: float,
-) -> SolverReport:
-    """Report a motion that was not changed by a solver."""
-    return SolverReport(
-        solver=SOLVER,
-        status=status,
-        x=x,
-        objective=program.objective(x),
-        violation=violation,
-        multipliers=np.zeros(len(program.lower)),
-        iterations=0,
-        wall_time=seconds,
-        message="the fastest timing of the joint path",
-    )
-
-
 def begin_with_timing(
     program: Program,
     timings: Sequence[PhaseTiming | None],
@@ -428,12 +402,17 @@ def lay_splines(
         followed_phases.append(followed)
     phases, x_by_phase, violations = zip(*followed_phases, strict=True)
     finer = program.with_phases(phases)
+    x = np.concatenate(x_by_phase)
     seconds = time.perf_counter() - began
-    report = _report(
-        finer,
-        np.concatenate(x_by_phase),
-        SolveStatus.FOLLOWED,
-        max(violations),
-        seconds,
+    report = SolverReport(
+        solver=SOLVER,
+        status=SolveStatus.FOLLOWED,
+        x=x,
+        objective=finer.objective(x),
+        violation=max(violations),
+        multipliers=np.zeros(len(finer.lower)),
+        iterations=0,
+        wall_time=seconds,
+        message="the fastest timing of the joint path",
     )
     return finer, report

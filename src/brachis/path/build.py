@@ -378,7 +378,7 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
         frame = PathFrame.of(place_frame(task.frames, task.path_frame), task_map.rows)
     point = None
     if task.path_start is not None:
-        point = task_map.read(task.path_start, "path_start")
+        point = task_map.read_start(task.path_start)
         if frame is not None:
             point = frame.to_world(point)
     postures = {

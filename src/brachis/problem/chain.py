@@ -124,14 +124,9 @@ class ProblemChain(Problem):
         is_closed : bool
         """
         known = {item.name: getattr(whole, item.name) for item in fields(Problem)}
-        known["legs"] = tuple(leg for part in parts for leg in part.legs)
-        known["time_laws"] = tuple(law for part in parts for law in part.time_laws)
-        return cls(
-            **known,
-            chained=tuple(parts),
-            sections=tuple(map(tuple, sections)),
-            is_closed=is_closed,
-        )
+        names = tuple(map(tuple, sections))
+        chain = cls(**known, chained=(), sections=names, is_closed=is_closed)
+        return chain.with_parts(parts)
 
     @property
     def flights(self) -> list[list[int]]:

@@ -79,10 +79,3 @@ def torque(
         Masses are missing in the URDF.
     """
     return _chain_with_masses(robot).torques(q, qdot, qddot)
-
-
-def torque_derivatives(
-    robot: Robot, q: np.ndarray, qdot: np.ndarray, qddot: np.ndarray
-) -> TorqueDerivatives:
-    """Compute the exact derivatives of `torque`, which has the same parameters."""
-    return _chain_with_masses(robot).torque_derivatives(q, qdot, qddot)

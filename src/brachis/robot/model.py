@@ -8,7 +8,7 @@ import pinocchio as pin
 from brachis.errors import InputError, UrdfError
 from brachis.robot.urdf import LINK, UrdfChain
 from brachis.robot.urdf_bodies import check_inertia, symmetric_matrix
-from brachis.task import Payload, Placement, RobotSettings
+from brachis.task import Payload, RobotSettings
 
 
 def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Model:
@@ -52,7 +52,7 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             frame.name = frame.name.removeprefix(LINK)
     model.gravity.linear = np.array(settings.gravity)
     model.armature = np.zeros(model.nv)
-    base = _se3(settings.base_placement)
+    base = settings.base_placement.transform
     model.jointPlacements[1] = base * model.jointPlacements[1]
     for frame in list(model.frames)[1:]:  # the first one is the world itself
         if frame.parentJoint == 0:
@@ -68,13 +68,8 @@ def build_model(chain: UrdfChain, settings: RobotSettings, where: str) -> pin.Mo
             )
         inertia = _inertia(settings.payload)
         model.appendBodyToJoint(tool.parentJoint, inertia, tool.placement)
-    tool.placement = tool.placement * _se3(settings.tool_offset)
+    tool.placement = tool.placement * settings.tool_offset.transform
     return model
-
-
-def _se3(placement: Placement) -> pin.SE3:
-    rotation = pin.rpy.rpyToMatrix(*np.radians(placement.rpy_deg))
-    return pin.SE3(rotation, np.array(placement.xyz))
 
 
 def _inertia(payload: Payload) -> pin.Inertia:

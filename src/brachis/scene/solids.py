@@ -67,7 +67,10 @@ class Solid:
             The solid is too large.
         """
         self.geometry.setSweptSphereRadius(self.padding)
-        _check_size(self.geometry, self.name, self.padding)
+        self.geometry.computeLocalAABB()
+        if not isinstance(self.geometry, coal.Halfspace):
+            problem = "the body is too large for exact distances"
+            check_most(self.radius, _LARGEST, "m", problem, self.name)
 
     @property
     def radius(self) -> float:
@@ -234,15 +237,6 @@ def _lengths(shape: Element, attributes: tuple[str, ...], count: int) -> list[fl
     return lengths
 
 
-def _check_size(geometry: Geometry, where: str, padding: float = 0.0) -> None:
-    """Reject a body that is too large; an infinite half-space is allowed."""
-    geometry.computeLocalAABB()
-    if not isinstance(geometry, coal.Halfspace):
-        radius = geometry.aabb_radius + padding
-        problem = "the body is too large for exact distances"
-        check_most(radius, _LARGEST, "m", problem, where)
-
-
 def _hull(path: Path, scale: np.ndarray) -> Geometry:
     """Return the convex hull of a mesh file."""
     if not path.is_file():
@@ -252,7 +246,6 @@ def _hull(path: Path, scale: np.ndarray) -> Geometry:
     check_most(size, _LARGEST_FILE, "MB", "the mesh file is too large", str(path), hint)
     try:
         mesh = coal.MeshLoader(coal.NODE_TYPE.BV_AABB).load(str(path), scale)
-        _check_size(mesh, str(path))
         mesh.buildConvexHull(*_HULL)
     except (ValueError, RuntimeError) as error:
         raise InputError(

@@ -26,7 +26,7 @@ from brachis.optimise.backends import (
     FEASIBLE,
     SolverReport,
     SolveStatus,
-    objective_at,
+    report_point,
     residual,
     solvers_for,
 )
@@ -142,21 +142,18 @@ def _improve(
 
     From such a motion, at which no limit is active, an interior-point method makes much progress in a dozen iterations.
     """
-    task = candidate.problem.task
-    backends = [
-        solver for solver in solvers_for(task.solver.name) if solver.is_interior
-    ]
+    name = candidate.problem.task.solver.name
+    backends = [solver for solver in solvers_for(name) if solver.is_interior]
     for backend in backends[:1]:
         if options.deadline.passed:
             break
         program = first.refined.program
         session = SolverSession.for_task(
             backend,
-            task.solver,
+            candidate.problem,
             candidate.guess.joint_map,
             options.deadline.part(_SOLVE_SHARE).within(_LONGEST_SOLVE),
             ignore,
-            has_time_law=any(candidate.problem.time_laws),
         )
         report = session(program, first.refined.x)
         if report.violation < _NEARLY and _ROOM * report.objective < first.t_end:
@@ -188,16 +185,14 @@ def _find_nearest(program: Program, x: np.ndarray, deadline: Deadline) -> Solver
         x = changed
         violation = remaining
     is_feasible = violation <= FEASIBLE
-    return SolverReport(
-        solver="nearest motion",
-        status=SolveStatus.ACCEPTABLE if is_feasible else SolveStatus.STALLED,
-        x=x,
-        objective=objective_at(program, x),
-        violation=violation,
-        multipliers=np.zeros(len(program.lower)),
-        iterations=count,
-        wall_time=time.perf_counter() - began,
-        message="a motion within the limits near the joint path",
+    return report_point(
+        "nearest motion",
+        program,
+        x,
+        SolveStatus.ACCEPTABLE if is_feasible else SolveStatus.STALLED,
+        "a motion within the limits near the joint path",
+        time.perf_counter() - began,
+        count,
     )
 
 

@@ -14,8 +14,7 @@ import numpy as np
 
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
-from brachis.limits.safeguards import HELD_BACK
-from brachis.optimise.backends import SolverReport, SolveStatus
+from brachis.optimise.backends import SolverReport
 from brachis.optimise.extraction import meet
 from brachis.optimise.improve import (
     SolvedProgram,
@@ -55,9 +54,6 @@ _FIRST_LOSS = 0.05
 """Fraction of the motion time that the first knots may cost, if a mesh is refined from them."""
 _FIRST_INTERVALS = 16
 """Approximate number of intervals of such a first mesh."""
-_FIRST_MARGIN = 0.1
-"""Branch margin of a first solve. Without it, a plan on a rail at 0.1 m/s took three times as long, because four
-motions left their charts."""
 
 
 def solve_over_time(
@@ -82,7 +78,7 @@ def solve_over_time(
         The first splines leave the joint map.
     """
     first, x = _first_splines(guess, program)
-    return keep_feasible(_solve_clear_first(first, x, session), x)
+    return keep_feasible(attempt_once(session, first, x), x)
 
 
 def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.ndarray]:
@@ -113,25 +109,6 @@ def _first_splines(guess: InitialGuess, program: Program) -> tuple[Program, np.n
             "the splines through the joint path leave the branch, or the chart"
         )
     return even, x
-
-
-def _solve_clear_first(
-    program: Program, x: np.ndarray, session: SolverSession
-) -> SolvedProgram:
-    """Solve from x, (v,), clear of branch boundaries; if this holds the motion back, solve close to them as well.
-
-    Where many motions are equally fast, as at a given speed, the solver drifts to the boundary, and the motion leaves
-    the branch between the collocation points.
-    """
-    clear = attempt_once(session, program.with_margin(_FIRST_MARGIN), x)
-    if clear.report.status is SolveStatus.TIME_LIMIT:
-        return replace(clear, program=program)
-    if clear.usable and clear.program.safeguard_slack(clear.x) > HELD_BACK:
-        return clear
-    near = attempt_once(session, program, clear.x if clear.usable else x)
-    if near.usable or not clear.usable:
-        return replace(near, reports=clear.reports + near.reports)
-    return replace(clear, reports=near.reports + clear.reports)
 
 
 @dataclass(frozen=True)

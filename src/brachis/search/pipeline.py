@@ -290,12 +290,6 @@ def _open_session(
 ) -> SolverSession:
     """Open a session of the guess's solver with the solver settings of the task."""
     (backend,) = solvers_for(guess.solver)
-    problem = guess.problem
     return SolverSession.for_task(
-        backend,
-        problem.task.solver,
-        guess.joint_map,
-        deadline,
-        listener,
-        has_time_law=any(problem.time_laws),
+        backend, guess.problem, guess.joint_map, deadline, listener
     )

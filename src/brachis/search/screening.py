@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Listener
+from brachis.common.progress import Listener, ignore
 from brachis.errors import UnreachableError
-from brachis.optimise.backends import SolverOptions, solver_for_large, solvers_for
+from brachis.optimise.backends import solvers_for
 from brachis.optimise.improve import SolverSession
 from brachis.optimise.retiming import COARSE, ROUGH, PathEffort
 from brachis.optimise.transcription import program_of
@@ -171,9 +171,9 @@ def improve_quickly(
         return guess
     problem = guess.problem
     backend = solvers_for(problem.task.solver.name)[0]
-    options = SolverOptions(time_limit=np.inf, apart=any(problem.time_laws))
-    for_large = solver_for_large(problem.task.solver.name)
-    session = SolverSession(backend, options, deadline, for_large=for_large)
+    session = SolverSession.for_task(
+        backend, problem, guess.joint_map, deadline, ignore
+    )
     try:
         program = program_of(problem, guess.maps_by_leg()).at_rest()
         better = improve_guess(guess, program, session, effort, charts)

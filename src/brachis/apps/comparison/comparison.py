@@ -13,7 +13,7 @@ from brachis.apps.bottleneck.saturation import dense_samples, limit_ratios
 from brachis.apps.comparison.rows import RatioBounds, bound_ratios
 from brachis.apps.plots import style
 from brachis.apps.recording import import_motion, joint_path_of
-from brachis.common.arguments import check_callable, check_keywords
+from brachis.common.arguments import check_keywords, check_listener
 from brachis.common.files import file_name
 from brachis.common.progress import Listener
 from brachis.common.summary import Summary
@@ -263,7 +263,7 @@ def compare(
     >>> comparison.result.verified, comparison.saved > -1e-3
     (True, True)
     """
-    check_callable(listener, "listener")
+    check_listener(listener)
     if not isinstance(recorded, Trajectory):
         recorded = import_motion(
             file_name(recorded, "recorded"),

@@ -133,11 +133,11 @@ def verify_run(
             allowed=f"{profile.period:g} s ({profile.title})",
         )
     motion = with_profile(motion, profile, axes)
-    run = _Run(motion, profile, axes, tuple(own_limits))
-    report = run.verify(period)
+    run = _Run(motion, profile, axes, tuple(own_limits), period)
+    report = run.verify()
     if report.passed:
         return report
-    return replace(report, remedies=tuple(_find_remedies(run, period)))
+    return replace(report, remedies=tuple(_find_remedies(run)))
 
 
 def with_profile(
@@ -186,17 +186,18 @@ def axes_for(trajectory: Trajectory, profile: Profile) -> ControllerAxes:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A motion and the way a controller runs it."""
+    """A motion and the way a controller runs it, with a period, s."""
 
     motion: Trajectory
     profile: Profile
     axes: ControllerAxes
     own_limits: tuple[LimitModel, ...]
+    period: float
 
-    def verify(self, period: float) -> RunReport:
-        """Verify the run with a given period, s."""
+    def verify(self) -> RunReport:
+        """Verify the run."""
         profile = self.profile
-        samples = self.motion.sample(period, last=profile.last)
+        samples = self.motion.sample(self.period, last=profile.last)
         q = samples.q.copy()
         if profile.decimals is not None:
             values = np.round(self.axes.encode(q), profile.decimals)
@@ -231,7 +232,7 @@ class _Run:
             worst_ratio=worst,
             path_error=max(errors, default=0.0),
             controller=profile.title,
-            period=period,
+            period=self.period,
         )
 
     def _split(self, run: Trajectory) -> Iterator[tuple[float, Trajectory]]:
@@ -355,18 +356,23 @@ def _check_path(motion: CheckedMotion, profile: Profile) -> Check:
 
 
 def nearest_on_path(
-    path: Path, task_map: TaskMap, values: np.ndarray, s: np.ndarray
+    path: Path,
+    task_map: TaskMap,
+    values: np.ndarray,
+    s: np.ndarray,
+    ends: tuple[float, float] = (0.0, 1.0),
+    steps: int = 2,
 ) -> np.ndarray:
     """Return the path coordinates, (K,), of the points of a path that are closest to task coordinates, (K, c).
 
-    The search begins at `s`, (K,), close to them.
+    The search begins at `s`, (K,), close to them, and stays between two path coordinates, `ends`.
     """
-    for _ in range(2 if values.size else 0):
+    for _ in range(steps if values.size else 0):
         sample = path.sample(s)
         miss = task_map.difference(values, sample.target)
         along = sample.xi
         shift = np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
-        s = np.clip(s + shift, 0.0, 1.0)
+        s = np.clip(s + shift, *ends)
     return s
 
 
@@ -416,49 +422,50 @@ def _list_ratios(
     yield "tool speed", 1, (steps / allowed)[:, None], ("tool",)
 
 
-def _find_remedies(run: _Run, period: float) -> Iterator[str]:
+def _find_remedies(run: _Run) -> Iterator[str]:
     """Yield the smallest changes that let a run pass, each of them verified."""
     profile = run.profile
     decimals = range(10 if profile.decimals is None else profile.decimals + 1, 10)
     divisors = () if profile.fixed_period else _DIVISORS
-    periods = [1e3 * period / divisor for divisor in divisors]
+    periods = [1e3 * run.period / divisor for divisor in divisors]
     has_speeds = run.motion.task.tool_limits.process_speed
     speeds = () if has_speeds else [0.1 * number for number in range(999, 499, -1)]
 
-    def passes(changed: _Run, period: float) -> bool:
-        """Return whether a changed run passes."""
-        return changed.verify(period).passed
-
-    changes: tuple[tuple[str, Sequence[float], Callable[[Any], bool]], ...] = (
+    changes: tuple[tuple[str, Sequence[float], Callable[[Any], _Run]], ...] = (
         (
             "{} decimals",
             decimals,
-            lambda value: passes(
-                replace(run, profile=profile.model_copy(update={"decimals": value})),
-                period,
+            lambda value: replace(
+                run, profile=profile.model_copy(update={"decimals": value})
             ),
         ),
-        ("a period of {:g} ms", periods, lambda value: passes(run, 1e-3 * value)),
+        (
+            "a period of {:g} ms",
+            periods,
+            lambda value: replace(run, period=1e-3 * value),
+        ),
         (
             "{:g} % of the speed",
             speeds,
-            lambda value: passes(
-                replace(run, motion=slow_down(run.motion, 100.0 / value)), period
-            ),
+            lambda value: replace(run, motion=slow_down(run.motion, 100.0 / value)),
         ),
     )
-    for text, values, has_passed in changes:
-        index = _find_smallest(values, has_passed)
+    for text, values, change in changes:
+        index = _find_smallest(values, change)
         if index < len(values):
             yield f"the motion passes with {text.format(values[index])}"
     yield "to plan a motion that passes, plan with the profile (--profile)"
 
 
-def _find_smallest(values: Sequence[float], has_passed: Callable[[Any], bool]) -> int:
+def _find_smallest(values: Sequence[float], change: Callable[[Any], _Run]) -> int:
     """Return the index of a small change that passes; the number of values if none is found.
 
     Steps double until a change passes. Larger changes need not pass too: samples fall on other places of the motion.
     """
+
+    def has_passed(value: float) -> bool:
+        return change(value).verify().passed
+
     failed = 0
     index = 0
     while index < len(values) and not has_passed(values[index]):

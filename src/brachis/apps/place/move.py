@@ -16,7 +16,6 @@ from brachis.apps.place.search import WORKPIECE, PlaceSearch
 from brachis.common.arguments import count
 from brachis.common.progress import Listener, report_progress
 from brachis.planner import plan, read_arguments
-from brachis.result import Result
 from brachis.robot import Robot
 from brachis.task import Source, TaskKeywords
 
@@ -109,7 +108,9 @@ def place(
         )
         if after is not before:
             report("planning the task at the best place")
-            after = _faster(after, search.plan_at(robot, place_found, is_final=True))
+            final = search.plan_at(robot, place_found, is_final=True)
+            if final is not None and final.t_end < after.t_end:
+                after = final
     return Placing(
         moved=search.moved,
         change=search.change_at(place_found),
@@ -118,8 +119,3 @@ def place(
         after=after,
         trials=tuple(search.trials),
     )
-
-
-def _faster(first: Result, second: Result | None) -> Result:
-    """Return the faster of two results; the second one may be missing."""
-    return first if second is None or first.t_end <= second.t_end else second

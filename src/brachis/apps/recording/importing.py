@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from brachis import ik
+from brachis.apps.controller import nearest_on_path
 from brachis.apps.recording.nodes import (
     RecordedNodes,
     find_rests,
@@ -28,7 +29,7 @@ from brachis.common.arguments import check_keywords, numbers
 from brachis.common.arrays import spread, with_like_signs
 from brachis.common.files import file_name
 from brachis.errors import InputError, PathError, TaskError
-from brachis.path import Path, build_path
+from brachis.path import build_path
 from brachis.planner import RobotOrTask
 from brachis.robot import Robot, TaskMap, bind
 from brachis.robot.from_task import robot_for
@@ -277,7 +278,10 @@ def recover_path(
     worst = 0.0
     for (_, t, values, share), ends in zip(followed, places, strict=True):
         span = path.between(*ends)
-        s = _nearest(task_map, span, values, share, ends)
+        begun = np.interp(share, [0.0, 1.0], ends)
+        s = nearest_on_path(span, task_map, values, begun, ends, steps=4)
+        s[[0, -1]] = ends
+        s = np.maximum.accumulate(s)
         miss = task_map.difference(values, span.sample(s).target)
         worst = max(worst, float(np.max(task_map.norms(miss))))
         coordinates.append((t, s))
@@ -367,24 +371,6 @@ def _points(task_map: TaskMap, values: np.ndarray, rows: np.ndarray) -> Points:
     else:
         turning = np.unwrap(turning, axis=0)
     return Points(values[:, :count], turning, None, rows, "the tool's path", "sample")
-
-
-def _nearest(
-    task_map: TaskMap,
-    path: Path,
-    values: np.ndarray,
-    share: np.ndarray,
-    ends: tuple[float, float],
-) -> np.ndarray:
-    """Return the ascending path coordinates closest to task coordinates, (K, c); initial guesses come from `share`."""
-    s = np.interp(share, [0.0, 1.0], ends)
-    for _ in range(4):
-        sample = path.sample(s)
-        miss = task_map.difference(values, sample.target)
-        s += np.sum(miss * sample.xi, axis=1) / np.sum(sample.xi**2, axis=1)
-        s = np.clip(s, *ends)
-    s[[0, -1]] = ends
-    return np.maximum.accumulate(s)
 
 
 DEGREE = 3

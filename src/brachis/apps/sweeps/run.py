@@ -18,7 +18,7 @@ from brachis.apps.sweeps.plans import FAILED, Plan, PlanOutcome, SweepPlan, load
 from brachis.apps.sweeps.pools import Outcomes, Pool, pool_for
 from brachis.apps.sweeps.result import TABLE, Store, SweepResult
 from brachis.common import interrupts
-from brachis.common.arguments import check_callable
+from brachis.common.arguments import check_listener
 from brachis.common.progress import Listener, report_progress
 from brachis.common.words import name_first, write_count
 from brachis.errors import InputError
@@ -99,7 +99,7 @@ def sweep(
     >>> result.table.column("status").to_pylist()
     ['verified', 'verified']
     """
-    check_callable(listener, "listener")
+    check_listener(listener)
     with report_progress(listener, progress) as tell:
         tell("checking the sweep")
         planned = load_sweep(source)

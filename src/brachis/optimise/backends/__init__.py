@@ -5,11 +5,12 @@ from importlib.util import find_spec
 from brachis.errors import NotInstalledError, UnknownNameError
 from brachis.optimise.backends import ipopt, uno, uno_interior
 from brachis.optimise.backends.child_process import Solver
-from brachis.optimise.backends.monitor import objective_at, residual
+from brachis.optimise.backends.monitor import objective_at, report_point, residual
 from brachis.optimise.backends.protocol import (
     FEASIBLE,
     Curvature,
     NonlinearProgram,
+    ProgramRows,
     Progress,
     SolverOptions,
     SolverReport,
@@ -21,12 +22,14 @@ __all__ = [
     "NAMES",
     "Curvature",
     "NonlinearProgram",
+    "ProgramRows",
     "Progress",
     "SolveStatus",
     "Solver",
     "SolverOptions",
     "SolverReport",
     "objective_at",
+    "report_point",
     "residual",
     "solver_for_large",
     "solvers_for",

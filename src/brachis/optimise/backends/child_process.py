@@ -25,12 +25,7 @@ import numpy as np
 
 from brachis.common import interrupts
 from brachis.common.threads import use_one_thread
-from brachis.optimise.backends.monitor import (
-    SolveMonitor,
-    is_usable,
-    objective_at,
-    residual,
-)
+from brachis.optimise.backends.monitor import SolveMonitor, is_usable, report_point
 from brachis.optimise.backends.protocol import (
     NonlinearProgram,
     Progress,
@@ -98,7 +93,7 @@ class Solver:
             The user interrupted the solve. The error is raised once the backend has returned.
         """
         bounds = (program.lower, program.upper, program.x_lower, program.x_upper)
-        refuse = partial(_report_point, self.name, program, x)
+        refuse = partial(report_point, self.name, program, x)
         if options.time_limit <= 0.0:
             return refuse(SolveStatus.TIME_LIMIT, "no time was left")
         if not is_usable(x) or any(np.isnan(bound).any() for bound in bounds):
@@ -112,20 +107,6 @@ class Solver:
             if (options.apart or entries > max_entries) and not alone:
                 return subprocess_solve(self, program, x, options, progress)
             return self.run(SolveMonitor(program, options, progress), x)
-
-
-def _report_point(
-    solver: str,
-    program: NonlinearProgram,
-    x: np.ndarray,
-    status: SolveStatus,
-    message: str,
-    wall_time: float = 0.0,
-) -> SolverReport:
-    """Report a solve without a solution. The point `x`, (v,), is reported in place of the solution."""
-    values = (objective_at(program, x), residual(program, x))
-    none = np.zeros(len(program.lower))
-    return SolverReport(solver, status, x, *values, none, 0, wall_time, message)
 
 
 def subprocess_solve(
@@ -176,7 +157,7 @@ def subprocess_solve(
         status = SolveStatus.TIME_LIMIT
         message = "ended: it did not finish in time"
     point = x if best is None else best
-    return _report_point(solver.name, program, point, status, message, now - began)
+    return report_point(solver.name, program, point, status, message, now - began)
 
 
 def _receive(

@@ -275,6 +275,22 @@ def residual(program: NonlinearProgram, x: np.ndarray) -> float:
     return np.inf if np.isnan(least) else 0.0 - least
 
 
+def report_point(
+    solver: str,
+    program: NonlinearProgram,
+    x: np.ndarray,
+    status: SolveStatus,
+    message: str,
+    wall_time: float = 0.0,
+    iterations: int = 0,
+) -> SolverReport:
+    """Report a point, (v,), that no backend has found, without multipliers."""
+    values = (objective_at(program, x), residual(program, x))
+    none = np.zeros(len(program.lower))
+    effort = (iterations, wall_time)
+    return SolverReport(solver, status, x, *values, none, *effort, message)
+
+
 def row_slack(program: NonlinearProgram, x: np.ndarray) -> np.ndarray:
     """Return distances of rows from their nearer bounds, (c,); negative if violated, -inf if x cannot be evaluated."""
     try:

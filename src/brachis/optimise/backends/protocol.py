@@ -57,8 +57,8 @@ class Curvature:
     multipliers: np.ndarray
 
 
-class NonlinearProgram(Protocol):
-    """Interface of a sparse nonlinear program, for example `brachis.optimise.program.Program`."""
+class ProgramRows(Protocol):
+    """Variables with bounds, and rows of values between bounds."""
 
     x_lower: np.ndarray
     x_upper: np.ndarray
@@ -79,17 +79,21 @@ class NonlinearProgram(Protocol):
     def upper(self) -> np.ndarray:
         """Upper bounds of the rows."""
 
-    def objective(self, x: np.ndarray) -> float:
-        """Return the value to minimise; raise UnreachableError where the value does not exist."""
-
-    def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Return the gradient of the objective; raise UnreachableError as `objective` does."""
-
     def rows(self, x: np.ndarray) -> np.ndarray:
         """Return the values of the rows; raise UnreachableError where the values do not exist."""
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return the entries of the Jacobian on its pattern; raise UnreachableError as `rows` does."""
+
+
+class NonlinearProgram(ProgramRows, Protocol):
+    """Interface of a sparse nonlinear program, for example `brachis.optimise.program.Program`."""
+
+    def objective(self, x: np.ndarray) -> float:
+        """Return the value to minimise; raise UnreachableError where the value does not exist."""
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Return the gradient of the objective; raise UnreachableError as `objective` does."""
 
     def curvature(self, x: np.ndarray) -> Curvature | None:
         """Return the known part of the Lagrangian's Hessian, for a solve from x; None if no part is known."""

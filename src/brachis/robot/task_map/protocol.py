@@ -115,8 +115,8 @@ class TaskMap(Summary):
         """Unit of every row."""
         return tuple("m" if row in AXES else "rad" for row in self.rows)
 
-    def read(self, stated: Sequence[float] | ToolPose, where: str) -> np.ndarray:
-        """Return the task coordinates, (c,), that a task states as rows or as a pose.
+    def read_start(self, stated: Sequence[float] | ToolPose) -> np.ndarray:
+        """Return the task coordinates, (c,), of the ``path_start`` of a task, which states rows or a pose.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class TaskMap(Summary):
         if len(stated) != self.m:
             raise InputError(
                 "this is the wrong number of coordinates",
-                where=where,
+                where="path_start",
                 found=len(stated),
                 allowed=f"{self.m}: {', '.join(self.rows)}",
             )
