@@ -381,11 +381,14 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # to keep results small
 
-        for_large = self.choose_for_large(program)
-        if isinstance(program, PathProgram) and for_large:
-            solve = partial(solve_with, for_large)
+        is_over_path = isinstance(program, PathProgram)
+        first = self.choose_for_large(program) if is_over_path else None
+        if isinstance(program, Program) and program.has_speeds:
+            first = self.for_large
+        if first not in (None, self.backend):
+            solve = partial(solve_with, first)
             # From a motion far from the optimum, a solve with the near values alone far exceeds limits of others.
-            goes_on = self._goes_on(program, x)
+            goes_on = is_over_path and self._goes_on(program, x)
             report = (
                 solve_near_values(program, x, solve) if goes_on else solve(program, x)
             )

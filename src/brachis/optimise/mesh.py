@@ -181,7 +181,16 @@ def refine_mesh(
         return None if finer.variables == program.variables else (finer, x)
 
     attempt = partial(attempt_in_turn, solves_in_turn(solve))
-    return improve(solved, [halve] * 20, attempt, if_lost=_COARSER)
+    # More collocation points make a motion slightly slower. An interior-point method may end at a much slower one.
+    least_gain = -spline.tolerance
+    return improve(
+        solved,
+        [halve] * 20,
+        attempt,
+        least_gain=least_gain,
+        go_on_above=least_gain,
+        if_lost=_COARSER,
+    )
 
 
 def _choose_intervals(
@@ -190,9 +199,10 @@ def _choose_intervals(
     """Choose the intervals that cost the most time, which together cause 60 % of the loss in all phases."""
     x = solved.x
     program = solved.program
-    has_speeds = any(phase.time_law is not None for phase in program.phases)
     try:
-        losses = [_loss(*pair, has_speeds=has_speeds) for pair in program.split(x)]
+        losses = [
+            _loss(*pair, has_speeds=program.has_speeds) for pair in program.split(x)
+        ]
     except UnreachableError:  # between the collocation points
         return allowed
     mask = np.concatenate(allowed)

@@ -393,6 +393,11 @@ class Program(PhaseSequence[Phase], Summary):
         return Program(phases, self.links, self.minimised)
 
     @property
+    def has_speeds(self) -> bool:
+        """Whether the speed of a phase is given."""
+        return any(phase.time_law is not None for phase in self.phases)
+
+    @property
     def flies(self) -> bool:
         """Whether a phase begins or ends at a speed that is free."""
         return any(any(phase.boundary.are_speeds_free) for phase in self.phases)

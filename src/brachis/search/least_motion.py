@@ -19,7 +19,7 @@ import numpy as np
 
 from brachis.common import interrupts, tolerances
 from brachis.common.deadline import Deadline
-from brachis.common.progress import Iteration, Listener
+from brachis.common.progress import Iteration, Listener, ignore
 from brachis.common.summary import Summary
 from brachis.errors import UnreachableError
 from brachis.limits.joint import reciprocals_near
@@ -32,12 +32,18 @@ from brachis.optimise.backends import (
     solver_for_large,
     solvers_for,
 )
-from brachis.optimise.improve import SolverSession
-from brachis.optimise.objective import LeastAcceleration
+from brachis.optimise.improve import Solve, SolvedProgram, SolverSession
+from brachis.optimise.objective import EndTime, LeastAcceleration
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.search.stages import FinishedCandidate
+from brachis.search.stages import (
+    Candidate,
+    FinishedCandidate,
+    RankedCandidate,
+    fail,
+)
 from brachis.search.verified import refine_and_verify
+from brachis.task import Task
 from brachis.trajectory import Trajectory
 from brachis.verify import Verification
 
@@ -137,16 +143,10 @@ def _solve(
         status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
     if status:
         return _keep(fastest, status)
-    slower = max(task.search.slower, tolerances.END_TIME)
-    objective = least_acceleration(before.program, before.x, slower - _KEPT_BACK)
-    program = before.program.with_objective(objective)
-    soon = deadline.part(0.5)
     # With more than `_MANY` variables, this point is reached only if the motion may be slower.
-    for_large = solver_for_large("auto") if count > _MANY else None
-    backend = for_large or solvers_for(task.solver.name)[0]
-    solve = _session(backend, soon, listener)
-    longest = program.scale_time(before.x, 1.0 + slower - _KEPT_BACK)
-    first = solve(program, longest)
+    soon = deadline.part(0.5)
+    slower = max(task.search.slower, tolerances.END_TIME)
+    solve, program, first = _solve_for_smoothest(task, before, slower, soon, listener)
     if not first.status.usable:
         status = f"the fastest motion is kept: {_reason(first)}"
         return _keep(fastest, status, (first,))
@@ -157,8 +157,6 @@ def _solve(
         return _keep(fastest, too_similar, (first,))
     latest = before.t_end * (1.0 + slower)
     options = RefinementOptions.of(task.refinement, soon, latest)
-    # Refinement rounds begin close to their solution, so they may end sooner.
-    solve = replace(solve, options=replace(_OPTIONS, patience=2))
     calmer = refine_and_verify(fastest, program, (first,), solve, options)
     if not (isinstance(calmer, FinishedCandidate) and calmer.verified):
         status = "the fastest motion is kept: a smoother one was not verified"
@@ -171,6 +169,66 @@ def _solve(
     return LeastMotion(
         calmer.trajectory, calmer.verification, reduction, later, status, calmer.reports
     )
+
+
+def refine_smoothest(
+    candidate: RankedCandidate, fastest: SolvedProgram, deadline: Deadline
+) -> Candidate:
+    """Refine and verify the smoothest motion that is as fast as a solution over all knots, which is not refined itself.
+
+    Where the time is given, joints of a solution swing between its collocation points, and each refinement round moves
+    the swings elsewhere. A smooth motion needs few rounds.
+
+    Parameters
+    ----------
+    candidate : RankedCandidate
+    fastest : SolvedProgram
+    deadline : Deadline
+
+    Returns
+    -------
+    Candidate
+        A `FinishedCandidate` if a motion was found; its optimum is the fastest motion.
+    """
+    task = candidate.problem.task
+    soon = deadline.part(0.5)
+    slower = tolerances.END_TIME
+    solve, program, first = _solve_for_smoothest(task, fastest, slower, soon, ignore)
+    if not first.status.usable:
+        return fail(candidate, _reason(first), (first,))
+    latest = fastest.t_end * (1.0 + slower)
+    options = RefinementOptions.of(task.refinement, soon, latest)
+    reports = (*fastest.reports, first)
+    smoothest = refine_and_verify(candidate, program, reports, solve, options)
+    if not isinstance(smoothest, FinishedCandidate):
+        return smoothest
+    timed = smoothest.refined.program.with_objective(EndTime())
+    refined = replace(smoothest.refined, program=timed)
+    return replace(smoothest, refined=refined, optimum=fastest)
+
+
+def _solve_for_smoothest(
+    task: Task,
+    fastest: SolvedProgram,
+    slower: float,
+    deadline: Deadline,
+    listener: Listener,
+) -> tuple[Solve, Program, SolverReport]:
+    """Solve for the smoothest motion that is as fast, or slower by a fraction of up to `slower`.
+
+    The results are the function that solves in refinement rounds, the program, and the report.
+    """
+    count = len(fastest.x)
+    slower -= _KEPT_BACK
+    objective = least_acceleration(fastest.program, fastest.x, slower)
+    program = fastest.program.with_objective(objective)
+    for_large = solver_for_large("auto") if count > _MANY else None
+    backend = for_large or solvers_for(task.solver.name)[0]
+    solve = _session(backend, deadline, listener)
+    longest = program.scale_time(fastest.x, 1.0 + slower)
+    first = solve(program, longest)
+    # Refinement rounds begin close to their solution, so they may end sooner.
+    return replace(solve, options=replace(_OPTIONS, patience=2)), program, first
 
 
 def _reason(report: SolverReport) -> str:

@@ -42,7 +42,7 @@ from brachis.optimise.transcription import program_of
 from brachis.search.by_parts import finish_by_parts
 from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
-from brachis.search.least_motion import find_least_motion
+from brachis.search.least_motion import find_least_motion, refine_smoothest
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
 from brachis.search.over_time import (
     improve_timings,
@@ -197,6 +197,10 @@ def _finish_over_time(
         candidate = replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= to_beat.adapted:
             return replace(candidate, status=SLOW, reports=adapted.reports)
+        if adapted.program.has_speeds and guess.problem.task.search.least_motion:
+            smoothest = refine_smoothest(candidate, adapted, options.deadline)
+            if smoothest.is_settled:
+                return smoothest
     return _refine(candidate, adapted, session, options)
 
 
@@ -275,7 +279,9 @@ def _refine(
     first = solvers_for(candidate.problem.task.solver.name)[0]
     outcomes: list[Candidate] = []
     for backend in dict.fromkeys((first, session.backend)):
-        refining = replace(session, deadline=options.deadline, backend=backend)
+        refining = replace(
+            session, deadline=options.deadline, backend=backend, for_large=None
+        )
         outcome = refine_and_verify(
             candidate, adapted.program, adapted.reports, refining, options
         )
