@@ -111,6 +111,30 @@ def test_a_round_that_fails_is_left_to_the_other_solver(solved, name):
     assert (fine.not_completed == "") == bool(name)
 
 
+def test_a_finer_mesh_with_a_slower_motion_is_not_kept(solved):
+    def solve_slower(program, x):
+        report = solve(program, x)
+        slower = program.scale_time(report.x, 1.5)
+        time = program.end_time(slower)
+        return dataclasses.replace(report, x=slower, objective=time)
+
+    spline = SplineSettings(tolerance=1e-3)
+    same = refine_mesh(solved, solve_slower, spline, NEVER)
+    assert same.program is solved.program
+    assert len(same.reports) == 2
+
+
+@pytest.mark.parametrize("speed, name", [(0.5, "ipopt"), (None, "uno")])
+def test_an_interior_point_method_solves_first_where_a_speed_is_given(speed, name):
+    line = brachis.Line(by=[0.0, 0.4], speed=speed)
+    keys = {"start": [0.3, 0.2], "task_space": ["x", "y"], "path": line}
+    program, _ = brachis.transcribe("gantry2", **keys)
+    assert program.has_speeds == (speed is not None)
+    active, interior = (solvers_for(solver)[0] for solver in ("uno", "ipopt"))
+    session = SolverSession(active, SolverOptions(), NEVER, for_large=interior)
+    assert session(program, program.guess).solver == name
+
+
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
     failing = Broken().solve
     spline = SplineSettings(tolerance=1e-3)
