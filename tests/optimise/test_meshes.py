@@ -104,8 +104,8 @@ def test_a_smaller_tolerance_gives_a_faster_motion_on_more_intervals(solved):
 
 @pytest.mark.parametrize("name", ["ipopt", None])
 def test_a_round_that_fails_is_left_to_the_other_solver(solved, name):
-    for_large = solvers_for(name)[0] if name else None
-    session = SolverSession(Broken(), SolverOptions(), NEVER, for_large=for_large)
+    interior = solvers_for(name)[0] if name else None
+    session = SolverSession(Broken(), SolverOptions(), NEVER, interior=interior)
     fine = refine_mesh(solved, session, SplineSettings(tolerance=0.02), NEVER)
     assert (fine.program.intervals > solved.program.intervals) == bool(name)
     assert (fine.not_completed == "") == bool(name)
@@ -131,7 +131,7 @@ def test_an_interior_point_method_solves_first_where_a_speed_is_given(speed, nam
     program, _ = brachis.transcribe("gantry2", **keys)
     assert program.has_speeds == (speed is not None)
     active, interior = (solvers_for(solver)[0] for solver in ("uno", "ipopt"))
-    session = SolverSession(active, SolverOptions(), NEVER, for_large=interior)
+    session = SolverSession(active, SolverOptions(), NEVER, interior=interior)
     assert session(program, program.guess).solver == name
 
 

@@ -286,15 +286,16 @@ class SolverSession:
         Deadline of all solves together.
     progress : callable, optional
         Function called between iterations with their number and the objective.
-    for_large : Solver, optional
-        Solver that is tried first on large programs, because they are sparse; see `solver_for_large`.
+    interior : Solver, optional
+        Interior-point method that is tried first on large programs over the path, because they are sparse, and where a
+        speed is given: there many motions are equally fast, and it ends at a smooth one.
     """
 
     backend: Solver
     options: SolverOptions
     deadline: Deadline
     progress: Progress | None = None
-    for_large: Solver | None = None
+    interior: Solver | None = None
     _last: list[SolverReport] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -325,8 +326,8 @@ class SolverSession:
         def progress(iteration: int, objective: float) -> None:
             listener(Iteration(f"iteration {iteration}, t_E = {objective:.4f} s"))
 
-        for_large = solver_for_large(settings.name)
-        return cls(backend, options, deadline, progress, for_large=for_large)
+        interior = solver_for_large(settings.name)
+        return cls(backend, options, deadline, progress, interior)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
         """Return the session for programs over the path, with different options.
@@ -346,8 +347,15 @@ class SolverSession:
     def choose_for_large(self, program: NonlinearProgram) -> Solver | None:
         """Return the solver that is tried first if a program is large; None if the program is not."""
         entries = len(program.x_lower) * len(program.lower)
-        is_other = self.for_large is not self.backend
-        return self.for_large if is_other and entries > _LARGE_PROGRAM else None
+        is_other = self.interior is not self.backend
+        return self.interior if is_other and entries > _LARGE_PROGRAM else None
+
+    def _choose_first(self, program: Program | PathProgram) -> Solver | None:
+        """Return the interior-point method if it is tried first on a program; None if only the backend is tried."""
+        if isinstance(program, PathProgram):
+            return self.choose_for_large(program)
+        is_other = self.interior is not self.backend
+        return self.interior if is_other and program.has_speeds else None
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -381,17 +389,14 @@ class SolverSession:
             self._last[:] = [report]
             return replace(report, learnt=None)  # to keep results small
 
-        is_over_path = isinstance(program, PathProgram)
-        first = self.choose_for_large(program) if is_over_path else None
-        if isinstance(program, Program) and program.has_speeds:
-            first = self.for_large
-        if first not in (None, self.backend):
+        first = self._choose_first(program)
+        if first is not None:
             solve = partial(solve_with, first)
             # From a motion far from the optimum, a solve with the near values alone far exceeds limits of others.
-            goes_on = is_over_path and self._goes_on(program, x)
-            report = (
-                solve_near_values(program, x, solve) if goes_on else solve(program, x)
-            )
+            if isinstance(program, PathProgram) and self._goes_on(program, x):
+                report = solve_near_values(program, x, solve)
+            else:
+                report = solve(program, x)
             # If a row cannot be met, this solver ends at its start. The other one still makes the motion faster.
             is_lost = report.status is SolveStatus.INFEASIBLE
             if not (is_lost and report.objective >= program.objective(x)):
@@ -425,7 +430,7 @@ class SolverSession:
 
 
 def solves_in_turn(solve: Solve) -> list[Solve]:
-    """List the solve. If it is a session with a solver for large programs, add the session with that solver."""
-    if not isinstance(solve, SolverSession) or solve.for_large in (None, solve.backend):
+    """List the solve and, if it is a session with an interior-point method, the session with this method alone."""
+    if not isinstance(solve, SolverSession) or solve.interior in (None, solve.backend):
         return [solve]
-    return [solve, replace(solve, backend=solve.for_large)]
+    return [solve, replace(solve, backend=solve.interior)]

@@ -8,6 +8,8 @@ the same knots and within the same limits,
 
 The new motion is refined and verified like the first one. It is used if it is verified and smoother; otherwise the
 fastest motion is kept. In both cases, bottlenecks are found from the multipliers of the fastest motion.
+
+Where a speed is given, `refine_smoothest` comes first: the fastest motion itself is not refined.
 """
 
 from __future__ import annotations

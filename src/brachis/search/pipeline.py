@@ -13,7 +13,8 @@ phase plane does not cover (jerk, torque rate, means) do not affect this duratio
 candidates that may be the fastest, in one of two ways:
 
 - `_finish_over_time`, if knots are given (``intervals: 20``, or ``knots: free``), or if the phase plane does not cover
-  one of the limits. The solution of the program over time is refined.
+  one of the limits. The solution of the program over time is refined. Where a speed is given, the smoothest motion that
+  is as fast is refined in its place.
 - `_finish_over_path`, for ``intervals: auto`` and limits that the phase plane covers. The program over time improves
   the joint path. Its solution is refined if it is about as fast as the timing of its own joint path; otherwise splines
   are laid along this timing. For a large program they are laid first, unless its solution is much faster.
@@ -280,7 +281,7 @@ def _refine(
     outcomes: list[Candidate] = []
     for backend in dict.fromkeys((first, session.backend)):
         refining = replace(
-            session, deadline=options.deadline, backend=backend, for_large=None
+            session, deadline=options.deadline, backend=backend, interior=None
         )
         outcome = refine_and_verify(
             candidate, adapted.program, adapted.reports, refining, options
