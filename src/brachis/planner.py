@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from brachis import ik
+from brachis.common import interrupts
 from brachis.common.arguments import check_executor, check_listener, count
 from brachis.common.deadline import Deadline
 from brachis.common.interrupts import SigintHandler
@@ -44,7 +45,11 @@ from brachis.robots import is_robot, locate
 from brachis.search import Search, TaskProgram, first_guess, try_remedies
 from brachis.search.fewer_joints import search_motion
 from brachis.search.given_motion import widen_plan
-from brachis.search.least_motion import LeastMotion, find_least_motion
+from brachis.search.least_motion import (
+    LeastMotion,
+    find_least_motion,
+    keep_fastest,
+)
 from brachis.search.processes import process_count, run_in_processes
 from brachis.search.schedule import has_charts
 from brachis.search.stages import FinishedCandidate
@@ -248,7 +253,11 @@ def _find_smoother(
     if problem.is_chain or not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
-    smoothest = find_least_motion(best, deadline, report)
+    try:
+        smoothest = find_least_motion(best, deadline, report)
+    except KeyboardInterrupt:
+        interrupts.clear()
+        smoothest = keep_fastest(best, "interrupted")
     is_exact = best.problem.robot.n != problem.robot.n
     if is_exact and smoothest.trajectory is not best.trajectory:
         return widen_plan(smoothest, problem)

@@ -446,3 +446,27 @@ def test_two_processes_take_it_as_well():
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
     printed = output_of("-c", TWO_PROCESSES, env=environment)
     assert printed.split() == ["True", "True"]
+
+
+class Equal(Rate):
+    """A limit that counts as equal to every other one of its kind, as those of a dataclass do."""
+
+    __hash__ = Rate.__hash__
+
+    def __init__(self, kind):
+        self.kind = kind
+
+    def bind(self, robot):
+        Rate.__init__(self, robot)
+        self.labels = (Label("j3", self.kind.replace("_", " "), "rad/s"),)
+        return self
+
+    def __eq__(self, other):
+        return isinstance(other, Equal)
+
+
+def test_limits_that_count_as_equal_have_rows_of_their_own():
+    limits = [Equal("one_rate"), Equal("another_rate")]
+    program, _ = brachis.transcribe(LINE, own_limits=limits, redundant_joints=["j1"])
+    one, another = (program.rows_of(limit) for limit in limits)
+    assert not np.intersect1d(one, another).size

@@ -129,7 +129,7 @@ def test_an_interior_point_method_solves_first_where_a_speed_is_given(speed, nam
     line = brachis.Line(by=[0.0, 0.4], speed=speed)
     keys = {"start": [0.3, 0.2], "task_space": ["x", "y"], "path": line}
     program, _ = brachis.transcribe("gantry2", **keys)
-    assert program.has_speeds == (speed is not None)
+    assert program.has_time_laws == (speed is not None)
     active, interior = (solvers_for(solver)[0] for solver in ("uno", "ipopt"))
     session = SolverSession(active, SolverOptions(), NEVER, interior=interior)
     assert session(program, program.guess).solver == name

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import brachis
-from brachis.common.deadline import NEVER, Deadline
+from brachis.common.deadline import Deadline
 from brachis.robot.from_task import robot_for
 from brachis.search import least_motion
 from brachis.task import task_with
@@ -147,12 +147,15 @@ def test_without_time_or_a_verified_motion_the_fastest_stays():
     assert over.trajectory is fastest.trajectory
     assert over.status == "no time was left"
 
-    def interrupt(_text):
+
+def test_a_press_while_a_smoother_motion_is_sought_keeps_the_fastest(monkeypatch):
+    def press(*_arguments):
         raise KeyboardInterrupt
 
-    interrupted = least_motion.find_least_motion(fastest, NEVER, interrupt)
-    assert interrupted.trajectory is fastest.trajectory
-    assert interrupted.status == "interrupted"
+    monkeypatch.setattr("brachis.planner.find_least_motion", press)
+    interrupted = plan(least_motion=True)
+    assert interrupted.trajectory is interrupted.candidate.trajectory
+    assert interrupted.least_motion.status == "interrupted"
 
 
 def test_without_refinement_nothing_is_verified_and_the_fastest_stays():

@@ -213,8 +213,8 @@ class Description:
         What the limit restricts while the arm rests. "posture": only the posture, so that an angle and the same angle
         plus 2 pi count alike; an example is the torque that holds the arm against gravity. "turns": also the number of
         turns; an example is a range of joint positions.
-    is_of_speed : bool
-        Whether the ratios are those of the tool's speed to its maximum, however the joints move.
+    is_of_tool_speed : bool
+        Whether the values are ratios of the tool's speed to its maximum.
     breaks : (b,) ndarray
         Path coordinates at which the limit changes abruptly, so that the motion must be checked exactly there.
     order : int
@@ -237,7 +237,7 @@ class Description:
     role: Role = Role.ROBOT
     longer_time: Literal["relieves", "neither"] = "neither"
     at_rest: Literal["nothing", "posture", "turns"] = "nothing"
-    is_of_speed: bool = False
+    is_of_tool_speed: bool = False
     breaks: np.ndarray = np.empty(0)
     order: int = 2
     violation_scale: np.ndarray | float = 1.0

@@ -152,7 +152,7 @@ class ToolMotionLimit(ToolRatios):
         # Each table is represented by its largest figure.
         super().__init__(labels, [table.largest for table in tables])
         self.kind = f"tool_{quantity}".replace(" ", "_")
-        self.is_of_speed = quantity == "speed"
+        self.is_of_tool_speed = quantity == "speed"
         self._robot = robot
         self._quantity = quantity
         self._tables = tables

@@ -129,7 +129,7 @@ def improve(
     deadline : Deadline, optional
         Deadline after which no change is tried.
     if_lost : str, optional
-        Text that says what was not done, used if the last change gave no motion.
+        Text that says what was not done, used if the last change gave no motion that is kept.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def improve(
         else:
             incumbent = replace(incumbent, reports=with_last(incumbent.report, reports))
         if was_usable and go_on_above is not None and not gain > go_on_above:
-            not_completed = "" if tried.usable else if_lost
+            not_completed = "" if tried.usable and gain > least_gain else if_lost
             break
     return replace(incumbent, not_completed=not_completed)
 
@@ -188,14 +188,14 @@ def attempt_once(
 
 
 def attempt_in_turn(
-    solves: Sequence[Solve], program: Program, x: np.ndarray
+    solves: Sequence[Solve], program: Program, x: np.ndarray, slower: float
 ) -> SolvedProgram:
-    """Try several solves from x, (v,), in turn, until one of them gives a faster motion; see `attempt_once`."""
+    """Try several solves from x, (v,), in turn, until one gives a motion that is slower by at most a fraction."""
     reports: tuple[SolverReport, ...] = ()
     for solve in solves:
         tried = attempt_once(solve, program, x, accept_early_end=True)
         reports = (*reports, *tried.reports)
-        if tried.usable:
+        if tried.usable and tried.t_end <= (1.0 + slower) * program.end_time(x):
             break
     return replace(tried, reports=reports)
 
@@ -355,7 +355,7 @@ class SolverSession:
         if isinstance(program, PathProgram):
             return self.choose_for_large(program)
         is_other = self.interior is not self.backend
-        return self.interior if is_other and program.has_speeds else None
+        return self.interior if is_other and program.has_time_laws else None
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -401,7 +401,7 @@ class SolverSession:
             is_lost = report.status is SolveStatus.INFEASIBLE
             if not (is_lost and report.objective >= program.objective(x)):
                 report = self._accept(report)
-            if report.status.usable:
+            if report.status.usable or until.passed:
                 return report
         solve = partial(solve_with, self.backend)
         if self.backend.is_interior:
@@ -429,8 +429,10 @@ class SolverSession:
         return replace(report, status=SolveStatus.ACCEPTABLE)
 
 
-def solves_in_turn(solve: Solve) -> list[Solve]:
-    """List the solve and, if it is a session with an interior-point method, the session with this method alone."""
+def solves_in_turn(solve: Solve, program: Program) -> list[Solve]:
+    """List the solve; for a session with an interior-point method, its two methods in their order for a program."""
     if not isinstance(solve, SolverSession) or solve.interior in (None, solve.backend):
         return [solve]
-    return [solve, replace(solve, backend=solve.interior)]
+    backend = replace(solve, interior=None)
+    interior = replace(backend, backend=solve.interior)
+    return [interior, backend] if program.has_time_laws else [backend, interior]

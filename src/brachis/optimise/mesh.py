@@ -139,6 +139,7 @@ def refine_mesh(
 
     Every round halves the intervals that cost the most time, and solves again from the same motion. The rounds end when
     the last two together have gained less than half the tolerance. Before they end, a small mesh is halved everywhere.
+    They also end, without the last mesh, if its motion is slower by more than the tolerance.
 
     Parameters
     ----------
@@ -180,15 +181,19 @@ def refine_mesh(
             return _COARSER
         return None if finer.variables == program.variables else (finer, x)
 
-    attempt = partial(attempt_in_turn, solves_in_turn(solve))
     # More collocation points make a motion slightly slower. An interior-point method may end at a much slower one.
-    least_gain = -spline.tolerance
+    slower = spline.tolerance
+
+    def attempt(program: Program, x: np.ndarray) -> SolvedProgram:
+        """Solve with one method or the other."""
+        return attempt_in_turn(solves_in_turn(solve, program), program, x, slower)
+
     return improve(
         solved,
         [halve] * 20,
         attempt,
-        least_gain=least_gain,
-        go_on_above=least_gain,
+        least_gain=-slower,
+        go_on_above=-slower,
         if_lost=_COARSER,
     )
 
@@ -201,7 +206,8 @@ def _choose_intervals(
     program = solved.program
     try:
         losses = [
-            _loss(*pair, has_speeds=program.has_speeds) for pair in program.split(x)
+            _loss(*pair, has_time_laws=program.has_time_laws)
+            for pair in program.split(x)
         ]
     except UnreachableError:  # between the collocation points
         return allowed
@@ -210,16 +216,16 @@ def _choose_intervals(
     order = np.argsort(-lost, kind="stable")
     count = np.searchsorted(np.cumsum(lost[order]), 0.6 * lost.sum()) + 1
     chosen = np.zeros(len(lost), dtype=bool)
-    chosen[order[:count]] = True
+    chosen[order[:count]] = lost[order[:count]] > 0.0
     ends = np.cumsum([len(is_allowed) for is_allowed in allowed])
     return np.split(chosen & mask, ends[:-1])
 
 
-def _loss(phase: Phase, x: np.ndarray, *, has_speeds: bool) -> np.ndarray:
+def _loss(phase: Phase, x: np.ndarray, *, has_time_laws: bool) -> np.ndarray:
     """Estimate the time that each interval costs, (N,), s, from the swing of the most active limits.
 
-    As many limits are considered as there are curves. If the duration is given, no time can be lost. Beside a part with
-    a given speed, an interval costs no more than the tool would save at its maximum speed, however the joints swing.
+    As many limits are considered as there are curves. If the duration is given, no time can be lost. If the program has
+    another phase of given duration, the loss is no more than what the tool would save at its maximum speed.
     """
     if phase.time_law is not None:
         return np.zeros(phase.intervals)
@@ -232,10 +238,10 @@ def _loss(phase: Phase, x: np.ndarray, *, has_speeds: bool) -> np.ndarray:
     share = np.ptp(windows[::samples], axis=2).sum(axis=1)
     pairs = zip(dense.limits, dense.evaluate(x).by_limit, strict=True)
     for limit, values in pairs:
-        if has_speeds and limit.is_of_speed:
-            room = 1.0 - limit.ratio(values).max(axis=1)
-            rooms = sliding_window_view(room, samples + 1)[::samples]
-            share = np.minimum(share, rooms.mean(axis=1))
+        if has_time_laws and limit.is_of_tool_speed:
+            slack = np.maximum(1.0 - limit.ratio(values).max(axis=1), 0.0)
+            windows = sliding_window_view(slack, samples + 1)[::samples]
+            share = np.minimum(share, windows.mean(axis=1))
     return share * np.diff(breaks) * x[0]
 
 

@@ -44,6 +44,11 @@ class _PhaseWithRows(LinkedPhase, ProgramRows, Protocol):
 _Phase = TypeVar("_Phase", bound=_PhaseWithRows)
 
 
+def _position(limits: Sequence[Limit], limit: Limit) -> int | None:
+    """Return the index of a limit, None if it is not there. Limits of users may define what equal means."""
+    return next((number for number, other in enumerate(limits) if other is limit), None)
+
+
 class PhaseSequence(Generic[_Phase]):
     """Successive phases and the links between them, with the variables and the rows of all of them.
 
@@ -354,16 +359,16 @@ class Program(PhaseSequence[Phase], Summary):
         """
         if limit.guarantee.is_mean:
             limits = self.means.limits
-            earlier_limits = limits[: limits.index(limit)]
-            before = sum(len(earlier.lower) for earlier in earlier_limits)
+            number = _position(limits, limit)
+            before = sum(len(earlier.lower) for earlier in limits[:number])
             first = self._first_rows[-1] + before
             return np.arange(first, first + len(limit.lower))[None]
         pairs = zip(self.phases, self._first_rows, strict=False)
         return np.concatenate(
             [
-                first + phase.value_rows[phase.limits.index(limit)]
+                first + phase.value_rows[number]
                 for phase, first in pairs
-                if limit in phase.limits
+                if (number := _position(phase.limits, limit)) is not None
             ]
         )
 
@@ -393,7 +398,7 @@ class Program(PhaseSequence[Phase], Summary):
         return Program(phases, self.links, self.minimised)
 
     @property
-    def has_speeds(self) -> bool:
+    def has_time_laws(self) -> bool:
         """Whether the speed of a phase is given."""
         return any(phase.time_law is not None for phase in self.phases)
 

@@ -190,7 +190,7 @@ def is_timing_all(program: Program) -> bool:
     curve_links = [link for link in program.links if isinstance(link, CurveLink)]
     is_linked = any(max(link.orders) for link in curve_links)
     is_periodic = any(phase.boundary.periodic for phase in program.phases)
-    has_laws = program.has_speeds
+    has_laws = program.has_time_laws
     left_out = any(map(is_left_out, program.limits))
     return not (is_linked or is_periodic or has_laws or left_out)
 

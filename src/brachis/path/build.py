@@ -403,7 +403,14 @@ def path_of(task_map: TaskMap, task: Task) -> Path:
 
 
 class OffPathError(StartError):
-    """The tool in a given posture is not at the end of the path to which the posture belongs."""
+    """The tool in a given posture is not where the path starts or ends.
+
+    Attributes
+    ----------
+    name : {"start", "end"}
+    """
+
+    name: str
 
 
 def check_on_path(
@@ -422,7 +429,7 @@ def check_on_path(
     if miss[worst] > largest:
         unit = task_map.units[worst]
         distance, allowed = write_apart(miss[worst], largest, digits=3)
-        raise OffPathError(
+        error = OffPathError(
             f"the {name} posture is off the path",
             where=where,
             found=f"{distance} {unit} off in {task_map.rows[worst]}",
@@ -431,6 +438,8 @@ def check_on_path(
             or posture_hint(task_map.robot, posture)
             or f"Choose a posture with the tool at the {name} of the path",
         )
+        error.name = name
+        raise error
 
 
 def posture_hint(robot: Robot, posture: np.ndarray) -> str | None:

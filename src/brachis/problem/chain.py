@@ -63,7 +63,8 @@ def key_in_program(
     if head in ("start", "end"):
         ends = sections if head == "end" else before
         moves = [section.key for section in ends if section.kind == "move"]
-        return f"{moves[-1]}.move{key.removeprefix(head)}" if any(moves) else key
+        move = next(reversed(moves), "")
+        return f"{move}.move{key.removeprefix(head)}" if move else key
     paths = [section for section in sections if section.kind == "path"]
     main = (*paths, *sections)[0]
     segment = re.match(r"path\[(\d+)\]", key)
@@ -75,7 +76,7 @@ def key_in_program(
         number -= section.segments
     if head == "postures":
         return key
-    if head in PATH_KEYS and not interval:
+    if head in PATH_KEYS and main.key and not interval:
         return f"{main.key}.{key}"
     if interval:
         middle = np.mean(interval)

@@ -133,7 +133,7 @@ def _in_program(
     except OffPathError as error:
         error.where = f"{sections[0].key}: {sections[0].name}"
         advice = "Put {move: next} before it"
-        if "end" in error.problem:
+        if error.name == "end":
             error.where = "end"
             back = "back to its start" if task.end == "start" else "to its end"
             error.problem = f"the program does not lead {back} posture"

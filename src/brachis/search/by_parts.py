@@ -27,19 +27,24 @@ from brachis.search.stages import (
     rank,
 )
 from brachis.search.verified import verify
+from brachis.trajectory import Trajectory
 
 Finish = Callable[[RankedCandidate], Candidate]
 """Function that finishes the candidate of a single task."""
+Smooth = Callable[[FinishedCandidate, float], Trajectory]
+"""Function that returns the smoothest motion of a candidate, sought for a share of the remaining time."""
 
 
-def finish_by_parts(candidate: RankedCandidate, finish: Finish) -> Candidate:
-    """Finish the parts of a program one by one, between the postures in which they meet.
+def finish_by_parts(
+    candidate: RankedCandidate, finish: Finish, smooth: Smooth
+) -> Candidate:
+    """Finish the parts of a program one by one, between the postures in which they meet; then smooth each of them.
 
     Parameters
     ----------
     candidate : RankedCandidate
         Candidate of a `ChainGuess`.
-    finish : callable
+    finish, smooth : callable
 
     Returns
     -------
@@ -62,7 +67,11 @@ def finish_by_parts(candidate: RankedCandidate, finish: Finish) -> Candidate:
         if not isinstance(outcome, FinishedCandidate):
             return fail(candidate, outcome.status, outcome.reports)
         finished.append(outcome)
-    motions = [outcome.trajectory for outcome in finished]
+    count = len(finished)
+    motions = [
+        smooth(outcome, 1.0 / (count - number))
+        for number, outcome in enumerate(finished)
+    ]
     components = [
         part for motion in motions for _, part in motion.components or [(0.0, motion)]
     ]

@@ -9,17 +9,18 @@ the same knots and within the same limits,
 The new motion is refined and verified like the first one. It is used if it is verified and smoother; otherwise the
 fastest motion is kept. In both cases, bottlenecks are found from the multipliers of the fastest motion.
 
-Where a speed is given, `refine_smoothest` comes first: the fastest motion itself is not refined.
+If a speed is given, `refine_smoothest` makes this solve before refinement: the fastest motion itself is not refined.
 """
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from brachis.common import interrupts, tolerances
+from brachis.common import tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Iteration, Listener, ignore
 from brachis.common.summary import Summary
@@ -38,12 +39,7 @@ from brachis.optimise.improve import Solve, SolvedProgram, SolverSession
 from brachis.optimise.objective import EndTime, LeastAcceleration
 from brachis.optimise.program import Program
 from brachis.optimise.refine import RefinementOptions
-from brachis.search.stages import (
-    Candidate,
-    FinishedCandidate,
-    RankedCandidate,
-    fail,
-)
+from brachis.search.stages import FinishedCandidate, RankedCandidate
 from brachis.search.verified import refine_and_verify
 from brachis.task import Task
 from brachis.trajectory import Trajectory
@@ -54,8 +50,9 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by at least this fraction."""
 _MANY = 300
-"""Number of variables above which an iteration of an active-set method takes tenths of a second, or seconds. No
-smoother motion that is as fast is then sought. With 277 variables, 5 to 12 iterations took 1.5 to 2.2 s."""
+"""Number of variables above which an iteration of an active-set method takes tenths of a second, or seconds. A
+smoother motion is then sought only if it may be slower, or if a speed is given, by an interior-point method. With 277
+variables, 5 to 12 iterations took 1.5 to 2.2 s."""
 _OPTIONS = SolverOptions(
     tolerance=1e-6,
     max_iterations=60,
@@ -123,10 +120,7 @@ def find_least_motion(
     try:
         return _solve(fastest, deadline, listener)
     except UnreachableError as error:
-        return _keep(fastest, f"the fastest motion is kept: {error}")
-    except KeyboardInterrupt:
-        interrupts.clear()
-        return _keep(fastest, "interrupted")
+        return keep_fastest(fastest, f"the fastest motion is kept: {error}")
 
 
 def _solve(
@@ -141,31 +135,32 @@ def _solve(
         status = "the fastest motion is not verified"
     elif deadline.passed:
         status = "no time was left"
+    elif fastest.is_smoothest and not task.search.slower:
+        status = "the motion is already the smoothest one that is as fast"
     elif count > _MANY and not task.search.slower:
         status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
     if status:
-        return _keep(fastest, status)
-    # With more than `_MANY` variables, this point is reached only if the motion may be slower.
+        return keep_fastest(fastest, status)
     soon = deadline.part(0.5)
     slower = max(task.search.slower, tolerances.END_TIME)
     solve, program, first = _solve_for_smoothest(task, before, slower, soon, listener)
     if not first.status.usable:
         status = f"the fastest motion is kept: {_reason(first)}"
-        return _keep(fastest, status, (first,))
+        return keep_fastest(fastest, status, (first,))
     too_similar = (
         "the fastest motion is kept: no other motion is smoother by 5 % or more"
     )
     if 1.0 - np.sqrt(first.objective) < _WORTH_IT:
-        return _keep(fastest, too_similar, (first,))
+        return keep_fastest(fastest, too_similar, (first,))
     latest = before.t_end * (1.0 + slower)
     options = RefinementOptions.of(task.refinement, soon, latest)
     calmer = refine_and_verify(fastest, program, (first,), solve, options)
     if not (isinstance(calmer, FinishedCandidate) and calmer.verified):
         status = "the fastest motion is kept: a smoother one was not verified"
-        return _keep(fastest, status, calmer.reports)
+        return keep_fastest(fastest, status, calmer.reports)
     reduction = float(1.0 - np.sqrt(program.objective(calmer.refined.x)))
     if reduction < _WORTH_IT:
-        return _keep(fastest, too_similar, calmer.reports)
+        return keep_fastest(fastest, too_similar, calmer.reports)
     later = calmer.t_end / fastest.t_end - 1.0
     status = f"joint accelerations (rms) {100.0 * reduction:.2g} % lower at {100.0 * later:+.2g} % end time"
     return LeastMotion(
@@ -175,11 +170,11 @@ def _solve(
 
 def refine_smoothest(
     candidate: RankedCandidate, fastest: SolvedProgram, deadline: Deadline
-) -> Candidate:
+) -> FinishedCandidate | None:
     """Refine and verify the smoothest motion that is as fast as a solution over all knots, which is not refined itself.
 
-    Where the time is given, joints of a solution swing between its collocation points, and each refinement round moves
-    the swings elsewhere. A smooth motion needs few rounds.
+    If the time is given, joints swing between the collocation points of a solution, and each refinement round moves
+    these swings. A smooth motion needs few rounds.
 
     Parameters
     ----------
@@ -189,24 +184,28 @@ def refine_smoothest(
 
     Returns
     -------
-    Candidate
-        A `FinishedCandidate` if a motion was found; its optimum is the fastest motion.
+    FinishedCandidate or None
+        The motion, whose optimum is the fastest one. None if no such motion is verified.
     """
     task = candidate.problem.task
     soon = deadline.part(0.5)
     slower = tolerances.END_TIME
-    solve, program, first = _solve_for_smoothest(task, fastest, slower, soon, ignore)
-    if not first.status.usable:
-        return fail(candidate, _reason(first), (first,))
     latest = fastest.t_end * (1.0 + slower)
     options = RefinementOptions.of(task.refinement, soon, latest)
-    reports = (*fastest.reports, first)
-    smoothest = refine_and_verify(candidate, program, reports, solve, options)
-    if not isinstance(smoothest, FinishedCandidate):
-        return smoothest
-    timed = smoothest.refined.program.with_objective(EndTime())
-    refined = replace(smoothest.refined, program=timed)
-    return replace(smoothest, refined=refined, optimum=fastest)
+    with contextlib.suppress(UnreachableError):
+        solve, program, first = _solve_for_smoothest(
+            task, fastest, slower, soon, ignore
+        )
+        if not first.status.usable:
+            return None
+        reports = (*fastest.reports, first)
+        smoothest = refine_and_verify(candidate, program, reports, solve, options)
+        if isinstance(smoothest, FinishedCandidate) and smoothest.is_settled:
+            with_end_time = smoothest.refined.program.with_objective(EndTime())
+            refined = replace(smoothest.refined, program=with_end_time)
+            known = {"refined": refined, "optimum": fastest}
+            return replace(smoothest, **known, is_smoothest=True)
+    return None
 
 
 def _solve_for_smoothest(
@@ -218,19 +217,22 @@ def _solve_for_smoothest(
 ) -> tuple[Solve, Program, SolverReport]:
     """Solve for the smoothest motion that is as fast, or slower by a fraction of up to `slower`.
 
-    The results are the function that solves in refinement rounds, the program, and the report.
+    Returns
+    -------
+    solve : callable
+        Function that solves in refinement rounds.
+    program : Program
+    report : SolverReport
     """
-    count = len(fastest.x)
     slower -= _KEPT_BACK
     objective = least_acceleration(fastest.program, fastest.x, slower)
     program = fastest.program.with_objective(objective)
-    for_large = solver_for_large("auto") if count > _MANY else None
-    backend = for_large or solvers_for(task.solver.name)[0]
-    solve = _session(backend, deadline, listener)
-    longest = program.scale_time(fastest.x, 1.0 + slower)
-    first = solve(program, longest)
+    name = task.solver.name
+    interior = solver_for_large(name) if program.variables > _MANY else None
+    solve = _session(interior or solvers_for(name)[0], deadline, listener)
+    report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
     # Refinement rounds begin close to their solution, so they may end sooner.
-    return replace(solve, options=replace(_OPTIONS, patience=2)), program, first
+    return replace(solve, options=replace(_OPTIONS, patience=2)), program, report
 
 
 def _reason(report: SolverReport) -> str:
@@ -242,7 +244,7 @@ def _reason(report: SolverReport) -> str:
     return f"{report.iterations} iterations found no smoother one within the limits"
 
 
-def _keep(
+def keep_fastest(
     fastest: FinishedCandidate, status: str, reports: tuple[SolverReport, ...] = ()
 ) -> LeastMotion:
     """Keep the fastest motion."""

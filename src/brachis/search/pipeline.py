@@ -65,6 +65,7 @@ from brachis.search.stages import (
     rank,
 )
 from brachis.search.verified import refine_and_verify
+from brachis.trajectory import Trajectory
 
 _BEFORE_REFINEMENT = 0.5
 """Fraction of the remaining time for everything before refinement."""
@@ -128,8 +129,11 @@ def finish_candidate(
     program = candidate.program
     is_divided = len(candidate.problem.flights) > 1
     if is_divided and not (is_timing_all(program) or program.means):
-        finish_part = partial(_finish_part, deadline=deadline, listener=listener)
-        return finish_by_parts(candidate, finish_part)
+        finish_part = partial(
+            finish_candidate, to_beat=Marks(), deadline=deadline, listener=listener
+        )
+        smooth_part = partial(_smooth_part, deadline=deadline, listener=listener)
+        return finish_by_parts(candidate, finish_part, smooth_part)
     is_followed = follows_timing(candidate.guess, candidate.program)
     is_short = is_followed and deadline.left < LITTLE_TIME
     share = _IF_SHORT if is_short else _BEFORE_REFINEMENT
@@ -141,20 +145,13 @@ def finish_candidate(
         return fail(candidate, str(error))
 
 
-def _finish_part(
-    candidate: RankedCandidate, deadline: Deadline, listener: Listener
-) -> Candidate:
-    """Finish a part of a program by itself, with the smoothest motion that is as fast if the task asks for it."""
-    finished = finish_candidate(candidate, Marks(), deadline, listener)
-    is_smoothed = candidate.problem.task.search.least_motion
-    if not (is_smoothed and isinstance(finished, FinishedCandidate)):
-        return finished
-    smoothest = find_least_motion(finished, deadline, listener)
-    return replace(
-        finished,
-        trajectory=smoothest.trajectory,
-        verification=smoothest.verification,
-    )
+def _smooth_part(
+    part: FinishedCandidate, share: float, deadline: Deadline, listener: Listener
+) -> Trajectory:
+    """Return the smoothest motion of a part of a program, sought for a share of the remaining time if the task asks."""
+    if not part.problem.task.search.least_motion:
+        return part.trajectory
+    return find_least_motion(part, deadline.part(share), listener).trajectory
 
 
 def _finish_over_time(
@@ -198,10 +195,11 @@ def _finish_over_time(
         candidate = replace(candidate, adapted=adapted.t_end)
         if adapted.t_end >= to_beat.adapted:
             return replace(candidate, status=SLOW, reports=adapted.reports)
-        if adapted.program.has_speeds and guess.problem.task.search.least_motion:
-            smoothest = refine_smoothest(candidate, adapted, options.deadline)
-            if smoothest.is_settled:
-                return smoothest
+    is_smoothed = target.has_time_laws and guess.problem.task.search.least_motion
+    if adapted.usable and is_smoothed and not options.deadline.passed:
+        smoothest = refine_smoothest(candidate, adapted, options.deadline)
+        if smoothest is not None:
+            return smoothest
     return _refine(candidate, adapted, session, options)
 
 

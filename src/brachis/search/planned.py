@@ -135,7 +135,8 @@ class PlannedMotion(Summary):
         """The outcome of the search for the smoothest motion, in words."""
         if self.least_motion is not None:
             return self.least_motion.status
-        return "not for programs" if self.trajectory.parts else "off"
+        partly = "only of parts with process speeds or limits on jerk"
+        return partly if self.trajectory.parts else "off"
 
     @property
     def solver_report(self) -> SolverReport:

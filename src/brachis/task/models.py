@@ -205,7 +205,7 @@ class Task(CheckedModel):
             return content
         if content.get("program"):
             content = with_task_space(content)
-        elif content.get("program") == [] and not (
+        elif content.get("program") in ([], ()) and not (
             content.get("path") or content.get("task_space") == "free"
         ):
             raise refuse("the program is empty", key="program", allowed="parts")

@@ -330,7 +330,7 @@ class SearchSettings(CheckedModel):
     """Seed of the random number generator."""
     least_motion: Flag = True
     """Whether to choose the smoothest motion (least joint accelerations) within 1e-4 of the fastest end time. With more
-    than 200 variables, which are common with intervals: auto, slower is required."""
+    than 300 variables, which are common with intervals: auto, slower is required."""
     slower: Share = Field(default=0.0, ge=0.0, le=1.0)
     """Fraction by which the smoothest motion may be slower, for example 1 % or 0.01."""
 

@@ -73,7 +73,7 @@ def _interior() -> Solver:
 
 
 def solver_for_large(name: str) -> Solver | None:
-    """Return the solver that ``auto`` tries first for large, sparse programs; None if a single solver is named.
+    """Return the interior-point method of ``auto``, for large programs and given speeds; None if a solver is named.
 
     The effort of an interior-point method grows with the number of entries of the Jacobian. That of an active-set
     method grows at least with the square of the number of variables.
