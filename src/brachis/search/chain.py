@@ -274,7 +274,9 @@ class _ChainSearch:
         nearby = [begun] if begun.options else []
         options_of_all = []
         for number in paths:
-            options = self._options(number, nearby)
+            # A chain to the best option of each earlier path counts like the start.
+            beside = [_Chain((some[0],)) for some in options_of_all]
+            options = self._options(number, [*nearby, *beside])
             times = np.array([option.time for option in options])
             prices = self._price(number - 1, nearby, options).min(
                 axis=0, initial=np.inf
