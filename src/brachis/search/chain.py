@@ -270,9 +270,9 @@ class _ChainSearch:
     def _options_of_all(
         self, paths: Sequence[int], begun: _Chain
     ) -> list[list[_Option]]:
-        """Return the best options for each of several paths, close to the start or to the options of the first path."""
+        """Return the best options for each of several paths, close to the start and to options of the paths before."""
         nearby = [begun] if begun.options else []
-        options_of_all = []
+        options_of_all: list[list[_Option]] = []
         for number in paths:
             # A chain to the best option of each earlier path counts like the start.
             beside = [_Chain((some[0],)) for some in options_of_all]

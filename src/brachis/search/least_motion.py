@@ -203,8 +203,9 @@ def refine_smoothest(
         if isinstance(smoothest, FinishedCandidate) and smoothest.is_settled:
             with_end_time = smoothest.refined.program.with_objective(EndTime())
             refined = replace(smoothest.refined, program=with_end_time)
-            known = {"refined": refined, "optimum": fastest}
-            return replace(smoothest, **known, is_smoothest=True)
+            return replace(
+                smoothest, refined=refined, optimum=fastest, is_smoothest=True
+            )
     return None
 
 
