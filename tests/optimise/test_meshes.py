@@ -124,15 +124,38 @@ def test_a_finer_mesh_with_a_slower_motion_is_not_kept(solved):
     assert len(same.reports) == 2
 
 
-@pytest.mark.parametrize("speed, name", [(0.5, "ipopt"), (None, "uno")])
-def test_an_interior_point_method_solves_first_where_a_speed_is_given(speed, name):
-    line = brachis.Line(by=[0.0, 0.4], speed=speed)
-    keys = {"start": [0.3, 0.2], "task_space": ["x", "y"], "path": line}
-    program, _ = brachis.transcribe("gantry2", **keys)
-    assert program.has_time_laws == (speed is not None)
+@pytest.mark.parametrize(
+    "speed, task_space, name",
+    [
+        (0.1, "pose_free_roll", "ipopt"),
+        (0.1, "pose", "uno"),
+        (None, "pose_free_roll", "uno"),
+    ],
+)
+def test_an_interior_point_method_solves_first_at_a_given_speed_if_two_joints_are_free(
+    speed, task_space, name
+):
+    line = brachis.Line(by=[0.0, 0.05, 0.0], speed=speed)
+    keys = {"start": [0.0, 0.5, 0.0, -1.2, 0.0, 1.0, 0.3], "task_space": task_space}
+    program, _ = brachis.transcribe("iiwa14", path=line, **keys)
     active, interior = (solvers_for(solver)[0] for solver in ("uno", "ipopt"))
-    session = SolverSession(active, SolverOptions(), NEVER, interior=interior)
-    assert session(program, program.guess).solver == name
+    names = []
+
+    class Recorded:
+        """A solver that notes when it is asked, and gives no motion."""
+
+        def __init__(self, solver):
+            self.name = solver.name
+            self.is_interior = solver.is_interior
+
+        def solve(self, program, x, _options=None, _progress=None):
+            names.append(self.name)
+            return Broken().solve(program, x)
+
+    pair = Recorded(active), Recorded(interior)
+    session = SolverSession(pair[0], SolverOptions(), NEVER, interior=pair[1])
+    session(program, program.guess)
+    assert names[0] == name
 
 
 def test_what_cannot_be_solved_is_left_as_it_was(solved):
