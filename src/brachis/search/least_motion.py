@@ -49,6 +49,8 @@ _KEPT_BACK = 0.1 * tolerances.END_TIME
 """Fraction of the end time by which refinement may still lengthen the motion."""
 _WORTH_IT = 0.05
 """A motion replaces the fastest one if its accelerations are lower by at least this fraction."""
+_LEAST = 1e-6
+"""Value of the objective, relative to that of the first motion, below which no motion is much smoother."""
 _MUCH_SMOOTHER = 0.5
 """Value of the objective, relative to that of the first motion, below which a solve is repeated from its solution."""
 _MANY = 300
@@ -235,7 +237,7 @@ def _solve_for_smoothest(
     solve = _session(interior or solvers_for(name)[0], deadline, listener)
     report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
     # The solver ends when it gains little of the first value, at which a motion that swings is far from the smoothest.
-    while report.status.usable and report.objective < _MUCH_SMOOTHER:
+    while report.status.usable and _LEAST < report.objective < _MUCH_SMOOTHER:
         weights = objective.weights / np.sqrt(report.objective)
         scaled = program.with_objective(replace(objective, weights=weights))
         again = solve(scaled, report.x)
