@@ -236,6 +236,7 @@ def test_a_given_speed_is_held_in_a_program():
     program = [{"move": "next"}, seam, home]
     result = brachis.plan("gantry2", program=program, **keys, **QUICK)
     assert result.verified
+    assert result.smoothing == "off"
     begin, component = result.trajectory.components[1]
     held = [phase for phase in component.phases if phase.speed]
     assert [phase.speed for phase in held] == [0.5]

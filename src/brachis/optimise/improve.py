@@ -24,9 +24,9 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
+    interior_solver,
     objective_at,
     residual,
-    solver_for_large,
 )
 from brachis.optimise.near_rows import NearRows, solve_near_rows, solve_near_values
 from brachis.optimise.path_program import PathProgram
@@ -326,7 +326,7 @@ class SolverSession:
         def progress(iteration: int, objective: float) -> None:
             listener(Iteration(f"iteration {iteration}, t_E = {objective:.4f} s"))
 
-        interior = solver_for_large(settings.name)
+        interior = interior_solver(settings.name)
         return cls(backend, options, deadline, progress, interior)
 
     def over_path(self, options: SolverOptions) -> SolverSession:
@@ -355,7 +355,7 @@ class SolverSession:
         if isinstance(program, PathProgram):
             return self.choose_for_large(program)
         is_other = self.interior is not self.backend
-        return self.interior if is_other and _has_equals(program) else None
+        return self.interior if is_other and _has_many_optima(program) else None
 
     def __call__(self, program: Program | PathProgram, x: np.ndarray) -> SolverReport:
         """Solve a program from the point x, (v,).
@@ -435,10 +435,10 @@ def solves_in_turn(solve: Solve, program: Program) -> list[Solve]:
         return [solve]
     backend = replace(solve, interior=None)
     interior = replace(backend, backend=solve.interior)
-    return [interior, backend] if _has_equals(program) else [backend, interior]
+    return [interior, backend] if _has_many_optima(program) else [backend, interior]
 
 
-def _has_equals(program: Program) -> bool:
+def _has_many_optima(program: Program) -> bool:
     """Tell whether very many motions are equally fast: at a given speed, if two or more joints are redundant.
 
     An interior-point method then took 11 s, and an active-set method 33 s, on a rail with a free roll. With the rail

@@ -32,7 +32,7 @@ from brachis.optimise.backends import (
     SolverOptions,
     SolverReport,
     SolveStatus,
-    solver_for_large,
+    interior_solver,
     solvers_for,
 )
 from brachis.optimise.improve import Solve, SolvedProgram, SolverSession
@@ -233,7 +233,7 @@ def _solve_for_smoothest(
     objective = least_acceleration(fastest.program, fastest.x, slower)
     program = fastest.program.with_objective(objective)
     name = task.solver.name
-    interior = solver_for_large(name) if program.variables > _MANY else None
+    interior = interior_solver(name) if program.variables > _MANY else None
     solve = _session(interior or solvers_for(name)[0], deadline, listener)
     report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
     # The solver ends when it gains little of the first value, at which a motion that swings is far from the smoothest.

@@ -135,8 +135,9 @@ class PlannedMotion(Summary):
         """The outcome of the search for the smoothest motion, in words."""
         if self.least_motion is not None:
             return self.least_motion.status
-        partly = "only of parts with process speeds or limits on jerk"
-        return partly if self.trajectory.parts else "off"
+        if self.trajectory.parts and self.task.search.least_motion:
+            return "only of parts with process speeds or limits on jerk"
+        return "off"
 
     @property
     def solver_report(self) -> SolverReport:

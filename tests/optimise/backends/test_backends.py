@@ -18,8 +18,8 @@ from brachis.optimise.backends import (
     SOLVERS,
     SolverOptions,
     SolveStatus,
+    interior_solver,
     residual,
-    solver_for_large,
     solvers_for,
     uno,
 )
@@ -209,10 +209,10 @@ def test_registry(is_installed, interior, monkeypatch):
     assert NAMES == ("auto", "uno", "ipopt", "uno_interior")
     automatic = [backend.name for backend in solvers_for("auto")]
     assert automatic == ["uno", interior]
-    large = solver_for_large("auto")
+    large = interior_solver("auto")
     assert large is SOLVERS[interior]
     assert large.is_interior
-    assert solver_for_large("uno") is None
+    assert interior_solver("uno") is None
     for each in {*SOLVERS} - {"ipopt"}:
         assert solvers_for(each) == (SOLVERS[each],)
     with pytest.raises(UnknownNameError, match="Did you mean 'ipopt'") as caught:

@@ -28,10 +28,10 @@ __all__ = [
     "Solver",
     "SolverOptions",
     "SolverReport",
+    "interior_solver",
     "objective_at",
     "report_point",
     "residual",
-    "solver_for_large",
     "solvers_for",
 ]
 SOLVERS = {
@@ -72,7 +72,7 @@ def _interior() -> Solver:
     return SOLVERS["ipopt" if find_spec("ipyopt") else "uno_interior"]
 
 
-def solver_for_large(name: str) -> Solver | None:
+def interior_solver(name: str) -> Solver | None:
     """Return the interior-point method of ``auto``, for large programs and given speeds; None if a solver is named.
 
     The effort of an interior-point method grows with the number of entries of the Jacobian. That of an active-set
