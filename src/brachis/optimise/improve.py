@@ -188,14 +188,14 @@ def attempt_once(
 
 
 def attempt_in_turn(
-    solves: Sequence[Solve], program: Program, x: np.ndarray, slower: float
+    solves: Sequence[Solve], program: Program, x: np.ndarray
 ) -> SolvedProgram:
-    """Try several solves from x, (v,), in turn, until one gives a motion that is slower by at most a fraction."""
+    """Try several solves from x, (v,), in turn, until one of them gives a motion; see `attempt_once`."""
     reports: tuple[SolverReport, ...] = ()
     for solve in solves:
         tried = attempt_once(solve, program, x, accept_early_end=True)
         reports = (*reports, *tried.reports)
-        if tried.usable and tried.t_end <= (1.0 + slower) * program.end_time(x):
+        if tried.usable:
             break
     return replace(tried, reports=reports)
 
