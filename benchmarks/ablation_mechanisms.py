@@ -308,10 +308,10 @@ MECHANISMS = (
         {_SEARCH + "phase_plane._time_guess": fit_untimed},
     ),
     Mechanism(
-        "solver_for_large",
-        "the task's first solver for large programs over the path",
+        "interior_solver",
+        "the task's first solver, for large programs and at given speeds",
         {
-            _OPTIMISE + "improve.solver_for_large": return_none,
+            _OPTIMISE + "improve.interior_solver": return_none,
         },
     ),
     Mechanism(
