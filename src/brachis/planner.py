@@ -250,7 +250,7 @@ def _find_smoother(
     best: FinishedCandidate, problem: Problem, deadline: Deadline, report: Listener
 ) -> LeastMotion | None:
     """Find the smoothest motion that is as fast as the best one, if the task asks for it."""
-    if problem.is_chain or not problem.task.search.least_motion:
+    if not problem.task.search.least_motion:
         return None
     report("looking for the smoothest motion that is as fast")
     try:

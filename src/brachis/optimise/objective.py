@@ -97,7 +97,7 @@ class LeastAcceleration:
     Attributes
     ----------
     weights : (n,) ndarray
-        Weight of each joint, as the reciprocal of an acceleration.
+        Weight of each joint, as the reciprocal of an acceleration. The weight of further joints of a phase is 0.
     longest : (phases,) ndarray
         Upper bounds on the phases' durations, s.
     """
@@ -107,12 +107,13 @@ class LeastAcceleration:
 
     def value(self, phase: Phase, x: np.ndarray) -> float:
         """Return the mean over a phase; raise UnreachableError as `Phase.evaluate` does."""
-        squares = (phase.state(x).qddot * self.weights) ** 2
+        squares = (phase.state(x).qddot * self._weights_of(phase)) ** 2
         return float(_shares(phase) @ squares.sum(axis=1))
 
     def gradient(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Return the gradient of the mean, (v,); raise UnreachableError as `Phase.evaluate` does."""
-        slopes = 2.0 * _shares(phase)[:, None] * self.weights**2 * phase.state(x).qddot
+        weights = self._weights_of(phase)
+        slopes = 2.0 * _shares(phase)[:, None] * weights**2 * phase.state(x).qddot
         return phase.gradient(Partials(qddot=slopes[:, None]), x)
 
     def is_curved(self, _phase: Phase) -> bool:
@@ -121,11 +122,15 @@ class LeastAcceleration:
 
     def curvature(self, phase: Phase, x: np.ndarray) -> np.ndarray:
         """Return the Gauss-Newton part of the mean's Hessian, (v, v)."""
-        by_joints = np.tile(np.diag(self.weights), (len(phase.t_norm), 1, 1))
+        by_joints = np.tile(np.diag(self._weights_of(phase)), (len(phase.t_norm), 1, 1))
         by_curves = phase.evaluate(x).chain(Partials(qddot=by_joints))
         slopes = phase.slopes_by_variables(by_curves, x)
         shares = _shares(phase)[:, None]
         return phase.sum_outer_products(slopes, 2.0 * shares)
+
+    def _weights_of(self, phase: Phase) -> np.ndarray:
+        """Return the weights of all joints of a phase."""
+        return np.pad(self.weights, (0, phase.joint_map.robot.n - len(self.weights)))
 
 
 def _calm(phase: Phase, x: np.ndarray) -> np.ndarray:

@@ -77,7 +77,10 @@ def finish_by_parts(
     ]
     motion = compose(guess.problem, components)
     known = replace(candidate, guess=replace(guess, problem=chain))
-    return verify(known, candidate.reports, _together(finished), motion)
+    done = verify(known, candidate.reports, _together(finished), motion)
+    if isinstance(done, FinishedCandidate):
+        return replace(done, is_smoothest=True)
+    return done
 
 
 def _guess_of(

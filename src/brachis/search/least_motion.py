@@ -10,6 +10,8 @@ The new motion is refined and verified like the first one. It is used if it is v
 fastest motion is kept. In both cases, bottlenecks are found from the multipliers of the fastest motion.
 
 If a speed is given, `refine_smoothest` makes this solve before refinement: the fastest motion itself is not refined.
+Before splines are laid along the timings of a program's many parts, `smoothen` makes it, because splines have too many
+variables.
 """
 
 from __future__ import annotations
@@ -67,6 +69,9 @@ _OPTIONS = SolverOptions(
     acceptable=FEASIBLE,
 )
 """Options that bound the effort of a solve."""
+_OF_INTERIOR = replace(_OPTIONS, max_iterations=20, first_step=0.01, damping=1.0)
+"""The same for an interior-point method. After 20 iterations, accelerations were at most 10 % above those after 60. With
+a damping of 0.1, limits were still exceeded after 60; with 10, accelerations were up to half as high again."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,7 +144,7 @@ def _solve(
         status = "the fastest motion is not verified"
     elif deadline.passed:
         status = "no time was left"
-    elif fastest.is_smoothest and not task.search.slower:
+    elif fastest.is_smoothest and (fastest.problem.is_chain or not task.search.slower):
         status = "the motion is already the smoothest one that is as fast"
     elif count > _MANY and not task.search.slower:
         status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
@@ -213,6 +218,18 @@ def refine_smoothest(
     return None
 
 
+def smoothen(
+    task: Task, fastest: SolvedProgram, deadline: Deadline
+) -> np.ndarray | None:
+    """Return a motion, (v,), that is much smoother than a solution of a large program, and as fast; None if none is known."""
+    slower = task.spline.tolerance
+    objective = least_acceleration(fastest.program, fastest.x, slower)
+    program = fastest.program.with_objective(objective)
+    solve = _session(interior_solver(task.solver.name), deadline, ignore)
+    report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
+    return report.x if report.status.usable else None
+
+
 def _solve_for_smoothest(
     task: Task,
     fastest: SolvedProgram,
@@ -245,7 +262,7 @@ def _solve_for_smoothest(
             break
         report = replace(again, objective=program.objective(again.x))
     # Refinement rounds begin close to their solution, so they may end sooner.
-    return replace(solve, options=replace(_OPTIONS, patience=2)), program, report
+    return replace(solve, options=replace(solve.options, patience=2)), program, report
 
 
 def _reason(report: SolverReport) -> str:
@@ -275,11 +292,18 @@ def least_acceleration(
     there is none, the largest velocity at x of all joints with the same unit and without such a limit. Joints without
     any limit, such as the virtual roll of a tool, do not count.
     """
-    robot = program.phases[0].joint_map.robot
+    # Phases with more joints have virtual ones, which do not count.
+    least, phase = min(
+        enumerate(program.phases), key=lambda pair: pair[1].joint_map.robot.n
+    )
+    robot = phase.joint_map.robot
     states = program.states(x)
-    middle = states[0].q[len(states[0].q) // 2]
-    by_acceleration, weights = reciprocals_near(robot, program.limits, middle)
-    speeds = np.max([np.abs(state.qdot).max(axis=0) for state in states], axis=0)
+    postures = states[least].q
+    by_acceleration, weights = reciprocals_near(
+        robot, phase.limits, postures[len(postures) // 2]
+    )
+    velocities = np.concatenate([state.qdot[:, : robot.n] for state in states])
+    speeds = np.abs(velocities).max(axis=0)
     units = np.array(robot.position_units)
     for unit in set(robot.position_units):
         unlimited = (units == unit) & (weights == 0.0) & (by_acceleration > 0.0)
@@ -301,4 +325,5 @@ def _session(backend: Solver, deadline: Deadline, listener: Listener) -> SolverS
         text = f"least motion: iteration {iteration}, joint accelerations (rms) {rms:.1f} %"
         listener(Iteration(text))
 
-    return SolverSession(backend, _OPTIONS, deadline, progress)
+    options = _OF_INTERIOR if backend.is_interior else _OPTIONS
+    return SolverSession(backend, options, deadline, progress)

@@ -7,11 +7,12 @@ collocation points.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brachis.common import tolerances
 from brachis.common.arrays import spread
 from brachis.errors import UnreachableError
 from brachis.optimise.backends import SolverReport
@@ -123,11 +124,14 @@ class BetterTimings:
         The fastest known timings, one for each phase of the program.
     solved : SolvedProgram or None
         The motion over time; None if the solve gave none.
+    is_smoothest : bool
+        Whether the joint paths are those of the smoothest motion that is as fast as `solved`.
     """
 
     program: Program
     timings: Sequence[PhaseTiming | None]
     solved: SolvedProgram | None = None
+    is_smoothest: bool = False
 
     @property
     def t_end(self) -> float:
@@ -148,9 +152,13 @@ def shorten_solves(session: SolverSession) -> SolverSession:
 
 
 def improve_timings(
-    guess: InitialGuess, program: Program, paths: BetterPaths, session: SolverSession
+    guess: InitialGuess,
+    program: Program,
+    paths: BetterPaths,
+    session: SolverSession,
+    smooth: Callable[[SolvedProgram], np.ndarray | None],
 ) -> BetterTimings:
-    """Solve over time from splines along timings, and time the joint path of the solution.
+    """Solve over time from splines along timings, and time the joint path of the solution, and of a smoother one.
 
     Parameters
     ----------
@@ -160,6 +168,8 @@ def improve_timings(
     paths : BetterPaths
         Joint paths of the program's phases.
     session : SolverSession
+    smooth : callable
+        ``smooth(solved)`` returns the smoothest motion that is as fast as a solution, (v,); None if it looks for none.
 
     Returns
     -------
@@ -182,14 +192,24 @@ def improve_timings(
     unrestricted = solved.program.with_phases(
         phase.with_limits(original.limits) for phase, original in pairs
     )
-    x = meet(unrestricted, solved.x)
-    timings = time_phases(unrestricted, x)
-    is_faster = least_time(timings) < paths.t_end
-    # Between its points, the solution may exceed limits on postures, which no timing of its joint path can meet.
+    # Between its points, a solution may exceed limits on postures, which no timing of its joint path can meet.
     allowed = max(paths.violation, guess.problem.task.refinement.tolerance)
-    if is_faster and _violation_of_postures(unrestricted, x) <= allowed:
-        return BetterTimings(unrestricted, timings, solved)
-    return replace(unimproved, solved=solved)
+
+    def time_motion(known: BetterTimings, x: np.ndarray, later: float) -> BetterTimings:
+        """Time the joint path of a motion; keep the known one if it is faster by more than a fraction."""
+        x = meet(unrestricted, x)
+        timings = time_phases(unrestricted, x)
+        is_fast = least_time(timings) < (1.0 + later) * known.t_end
+        if is_fast and _violation_of_postures(unrestricted, x) <= allowed:
+            return BetterTimings(unrestricted, timings, solved)
+        return known
+
+    fastest = time_motion(replace(unimproved, solved=solved), solved.x, 0.0)
+    x = smooth(solved)
+    if x is None:
+        return fastest
+    smoothest = time_motion(fastest, x, tolerances.END_TIME)
+    return replace(smoothest, is_smoothest=smoothest is not fastest)
 
 
 def _violation_of_postures(program: Program, x: np.ndarray) -> float:

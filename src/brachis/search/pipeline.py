@@ -43,7 +43,7 @@ from brachis.optimise.transcription import program_of
 from brachis.search.by_parts import finish_by_parts
 from brachis.search.first_motion import LITTLE_TIME
 from brachis.search.joint_choice import best_of_joints
-from brachis.search.least_motion import find_least_motion, refine_smoothest
+from brachis.search.least_motion import find_least_motion, refine_smoothest, smoothen
 from brachis.search.over_path import follows_timing, improve_over_path, lay_along_timing
 from brachis.search.over_time import (
     improve_timings,
@@ -72,6 +72,8 @@ _BEFORE_REFINEMENT = 0.5
 _IF_SHORT = 0.2
 """The same fraction if there is little time and splines are laid, which takes half a second. With 0.5, splines were
 laid too late."""
+_FOR_SMOOTHING = 0.3
+"""Maximum fraction of the remaining time for a smoother motion, before splines are laid along it."""
 _WORTH_REFINING = 0.05
 """Fraction of the time that refinement must save for a large program to be refined before splines are laid."""
 
@@ -215,13 +217,22 @@ def _finish_over_path(
     are laid along the timing. Parts that meet in motion stop over the path; the program over time finds their speeds.
     """
     guess = candidate.guess
+    task = guess.problem.task
     program = candidate.program
-    tolerance = guess.problem.task.spline.tolerance
+    tolerance = task.spline.tolerance
     at_rest = program.at_rest()
     paths = improve_joint_paths(at_rest, guess.legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
     session = shorten_solves(session)
-    retimed = improve_timings(guess, program, paths, session)
+
+    def smooth(solved: SolvedProgram) -> np.ndarray | None:
+        """Return the smoothest motion of a large program that is as fast as its solution."""
+        is_large = session.choose_for_large(solved.program) is not None
+        if is_large and guess.problem.is_chain and task.search.least_motion:
+            return smoothen(task, solved, options.deadline.part(_FOR_SMOOTHING))
+        return None
+
+    retimed = improve_timings(guess, program, paths, session, smooth)
     reports = (*reports, *retimed.reports)
     least = retimed.t_end + guess.problem.dwell_time
     candidate = replace(candidate, adapted=least, reports=reports)
@@ -242,7 +253,7 @@ def _finish_over_path(
             candidate, retimed.program, retimed.timings, reports, options
         )
         if isinstance(laid, FinishedCandidate) and solved is not None:
-            return replace(laid, optimum=solved)
+            return replace(laid, optimum=solved, is_smoothest=retimed.is_smoothest)
         return laid
 
     def refine() -> Candidate | None:

@@ -133,11 +133,7 @@ class PlannedMotion(Summary):
     @property
     def smoothing(self) -> str:
         """The outcome of the search for the smoothest motion, in words."""
-        if self.least_motion is not None:
-            return self.least_motion.status
-        if self.trajectory.parts and self.task.search.least_motion:
-            return "only of parts with process speeds or limits on jerk"
-        return "off"
+        return "off" if self.least_motion is None else self.least_motion.status
 
     @property
     def solver_report(self) -> SolverReport:

@@ -1,6 +1,7 @@
 """IPOPT, an interior-point method, through the ipyopt wheel. It solves large programs, and others if Uno fails.
 
-The Hessian is IPOPT's limited-memory approximation. https://coin-or.github.io/Ipopt
+The Hessian is IPOPT's limited-memory approximation or, with the option `damping`, the known part of the program's
+Hessian. https://coin-or.github.io/Ipopt
 """
 
 from __future__ import annotations
@@ -29,8 +30,13 @@ _OPTIONS: dict[str, int | float | str] = {
     # With a larger barrier, thousands of rows drive the first iterates to motions ten times as slow.
     "mu_max": 1e-3,
     "bound_relax_factor": 0.0,
+    # Approximate minimum degree. With the automatic choice, a solve with 10,486 rows took 3.1 s in place of 2.0 s.
+    "mumps_pivot_order": 0,
 }
 """Options of IPOPT for every program."""
+_PUSH = 1e-2
+"""Distance from bounds to which IPOPT pushes a starting point, relative to their size. This is its default."""
+_PUSHES = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
 _STATUS = {
     0: SolveStatus.OPTIMAL,
     1: SolveStatus.ACCEPTABLE,
@@ -92,7 +98,24 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         """Convert infinite bounds to IPOPT's form."""
         return np.clip(bounds, -2e19, 2e19)  # IPOPT treats 1e19 as infinity
 
+    known = program.curvature(x) if options.damping else None
     nothing = np.array([], dtype=int)
+    entries = (nothing, nothing)
+    by_hessian: dict[str, str] = {}
+    if known is not None:
+        at_start = known.hessian(x, 1.0, known.multipliers)
+        # Entries that are zero at the start are left out. The Hessian is only an approximation.
+        entries = np.nonzero(np.tril(at_start) + np.eye(len(x)))
+        by_hessian["hessian_approximation"] = "exact"
+
+    def write_hessian(
+        point: np.ndarray, multipliers: np.ndarray, factor: float, out: np.ndarray
+    ) -> None:
+        """Write the known part of the Hessian, damped along its diagonal."""
+        full = known.hessian(point, factor, -multipliers)
+        damping = options.damping * np.median(full.diagonal())
+        out[:] = (full + damping * np.eye(len(x)))[entries]
+
     backend = ipyopt.Problem(
         len(x),
         clip(program.x_lower),
@@ -101,14 +124,17 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         clip(program.lower),
         clip(program.upper),
         (program.jacobian_rows, program.jacobian_columns),
-        (nothing, nothing),
+        entries,
         lambda point: objective_at(program, point, np.nan),
         or_nan(monitor.gradient),
         or_nan(monitor.rows),
         or_nan(differentiate, 0.0),  # NaN at the first point ends the process
+        write_hessian if known else None,
         intermediate_callback=intermediate,
         ipopt_options={
             **_OPTIONS,
+            **by_hessian,
+            **dict.fromkeys(_PUSHES, _PUSH * options.first_step),
             "tol": options.tolerance,
             "constr_viol_tol": options.tolerance,
             "max_iter": options.max_iterations,

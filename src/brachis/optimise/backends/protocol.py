@@ -120,7 +120,10 @@ class SolverOptions:
     acceptable : float
         Largest violation with which a solution counts as usable, however the solve ended.
     first_step : float
-        Factor on the initial radius of the trust region, below 1 for starts close to the solution. Used by Uno.
+        Factor on the initial radius of Uno's trust region, or on the distance by which IPOPT moves the start away from
+        bounds. Below 1 for starts close to the solution.
+    damping : float
+        If positive, the Hessian is its known part plus this multiple of the median of its diagonal. Used by IPOPT.
     widening : float
         Maximum widening of a row's bound, as a fraction of the bound; no more than the tolerance. Used by Uno.
     anywhere : bool
@@ -142,6 +145,7 @@ class SolverOptions:
     patience: int = 15
     acceptable: float = -np.inf
     first_step: float = 1.0
+    damping: float = 0.0
     widening: float = 0.0
     anywhere: bool = False
     apart: bool = False
