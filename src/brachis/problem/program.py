@@ -311,7 +311,7 @@ def _task_of(
         "tool_limits": limited.tool_limits or task.tool_limits,
     }
     if isinstance(limited, MovePart):
-        return task.model_copy(update=changes)
+        return _checked(task, changes)
     changes |= path_keys(limited)
     segments = _segments(stretch)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})

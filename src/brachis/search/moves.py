@@ -9,6 +9,7 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
+from brachis.problem.feasibility import check_moves
 from brachis.problem.problem import Problem
 from brachis.search.guesses import SCREENED, SearchLevel
 from brachis.search.holding import explain_postures
@@ -43,7 +44,7 @@ def move_guesses(
     TaskError
         The start or end posture is missing.
     PathError
-        No joint path was found.
+        No joint path was found, or both postures are the same.
     NotInstalledError
         Something is in the way, and OMPL is missing.
     """
@@ -55,6 +56,7 @@ def move_guesses(
                 found="free",
                 allowed="a posture",
             )
+    check_moves(*problem.given_postures.values())
     ends = np.array([problem.start, problem.end])
     straight = guess_along(problem, ends, "line")
     space = FreeSpace.of(problem)

@@ -282,9 +282,8 @@ def _wrong_keys(detail: ErrorDetails, model: type[Model]) -> _Parts:
     known = re.findall(r"\w+", allowed)
     models = _models_at(detail["loc"], model)
     keys = {*known, *_keys_at(detail["loc"], model)}
-    unknown = [
-        name for name in content if isinstance(content, Mapping) and name not in keys
-    ]
+    stated = content if isinstance(content, Mapping) else {}
+    unknown = [name for name in stated if name not in keys]
     for name in unknown:
         hint = _KEYS_OF_OTHERS.get(name) or suggest(name, known)
         if hint:
