@@ -382,14 +382,17 @@ def _find_wrong_start(
         yield "program", "nothing moves", "at least one path or move"
     elif parts and parts[0].kind == "dwell":
         yield "program[0]", "the arm waits before it has moved", "a path or move first"
-    elif start == "free" and kinds[:1] == ["move"]:
+    elif (
+        start == "free"
+        and kinds[:1] == ["move"]
         # A motion that closes begins where its last path ends.
-        if end != "start" or kinds[-1] == "move":
-            yield (
-                "start",
-                "this key is missing: nothing else states where the program begins",
-                "a posture",
-            )
+        and (end != "start" or kinds[-1] == "move")
+    ):
+        yield (
+            "start",
+            "this key is missing: nothing else states where the program begins",
+            "a posture",
+        )
 
 
 def _find_wrong_flights(parts: Sequence[Part], *, is_closed: bool) -> Iterator[Mistake]:
