@@ -11,7 +11,13 @@ import pytest
 import brachis
 from brachis.common.deadline import NEVER
 from brachis.common.progress import ignore
-from brachis.errors import PathError, PlausibilityError, StartError, TaskError
+from brachis.errors import (
+    InputError,
+    PathError,
+    PlausibilityError,
+    StartError,
+    TaskError,
+)
 from brachis.optimise.links import PostureLink
 from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
@@ -649,3 +655,18 @@ def test_events_outside_the_motion_are_told(slide):
     (issue,) = result.warnings
     late_time = f"{result.t_end + 0.01:.4f}"
     assert issue.found == f"arc_on -0.0200 s, arc_off {late_time} s"
+
+
+@pytest.mark.parametrize("profile", [None, "kuka_rsi_4ms"])
+def test_events_outside_the_motion_are_not_exported(slide, profile, tmp_path):
+    early = {"name": "process_on", "lead": 0.02}
+    move = {"move": {"joints": [0.5]}, "events": [early]}
+    with pytest.warns(PlausibilityWarning, match="add a move before"):
+        result = plan_slide(slide, [move], start=[0.0])
+    match = "events.process_on: .*found -0.0200 s; .*change its lead"
+    with pytest.raises(InputError, match=match):
+        if profile is None:
+            brachis.export.write(result, tmp_path / "motion.csv")
+        else:
+            path = tmp_path / "motion.src"
+            brachis.export.write_for_controller(result, path, profile)
