@@ -4,6 +4,7 @@ The full count of programs is `benchmarks/programs.py`.
 """
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -664,9 +665,10 @@ def test_events_outside_the_motion_are_not_exported(slide, profile, tmp_path):
     with pytest.warns(PlausibilityWarning, match="add a move before"):
         result = plan_slide(slide, [move], start=[0.0])
     match = "events.process_on: .*found -0.0200 s; .*change its lead"
+    write = brachis.export.write
+    path = tmp_path / "motion.csv"
+    if profile is not None:
+        write = partial(brachis.export.write_for_controller, profile=profile)
+        path = tmp_path / "motion.src"
     with pytest.raises(InputError, match=match):
-        if profile is None:
-            brachis.export.write(result, tmp_path / "motion.csv")
-        else:
-            path = tmp_path / "motion.src"
-            brachis.export.write_for_controller(result, path, profile)
+        write(result, path)

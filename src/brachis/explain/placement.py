@@ -45,7 +45,6 @@ COORDINATES = {
 }
 """Coordinates of a change of a placement, and their units."""
 _HELD = "a given posture holds the path in its place"
-_BY_PARTS = "the parts were planned one by one, between the postures in which they meet"
 _KILOGRAMS = 10.0
 """Step of a mass, kg, as a multiple of the step of a placement, m. Torques are linear in the mass."""
 
@@ -118,7 +117,7 @@ def find_obstacle(problem: Problem, subject: str) -> str:
             if any(given) or any(to_postures):
                 return _HELD
             if part.given_postures:
-                return _BY_PARTS
+                return "the parts were planned one by one, between the postures in which they meet"
     return ""
 
 

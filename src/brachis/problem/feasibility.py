@@ -85,12 +85,7 @@ def check_postures(
 
 
 def check_moves(start: np.ndarray, end: np.ndarray) -> None:
-    """Refuse a move between two equal postures, (n,).
-
-    Raises
-    ------
-    PathError
-    """
+    """Refuse a move between two equal postures, (n,), by a PathError."""
     if np.abs(end - start).max() <= tolerances.WRITTEN:
         raise PathError(
             "the arm is already in this posture",

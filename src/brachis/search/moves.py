@@ -100,8 +100,7 @@ def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:
     """Return the guess of a move along the joint path through postures, (S, n)."""
     steps = np.abs(np.diff(q, axis=0) / problem.robot.scales).max(axis=1)
     length = np.append(0.0, np.cumsum(steps))
-    # A move between two equal postures has no length.
-    s = length / length[-1] if length[-1] else np.linspace(0.0, 1.0, len(q))
+    s = length / length[-1]
     stations = np.union1d(s, np.linspace(0.0, 1.0, _STATIONS))
     postures = interpolate_columns(stations, s, q)
     rows = ChartRows.constant(np.eye(problem.robot.n))

@@ -97,7 +97,15 @@ def show(value: object) -> str:
         keys = _shorten(", ".join(map(str, value)))
         return f"a mapping with the keys {keys}" if keys else "an empty mapping"
     if isinstance(value, list | tuple):
-        return f"{_shorten(repr(list(value)))} (a list)"
+        items = [
+            item.model_dump(mode="json", exclude_unset=True)
+            if isinstance(item, Model)
+            else item
+            for item in value
+        ]
+        # As in YAML, keys have no quotes.
+        text = re.sub(r"'(\w+)':", r"\1:", repr(items))
+        return f"{_shorten(text)} (a list)"
     text = repr(value)
     return type(value).__name__ if "\n" in text else _shorten(text)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.common.words import write_count
 from brachis.task.fields import (
@@ -129,6 +129,10 @@ class MovePart(LimitedPart):
     move: Annotated[
         Name | Posture,
         ByForm("next, the name of a posture, or a mapping {joints: [...]}"),
+        # A program in Python may give an array.
+        BeforeValidator(
+            lambda move: {"joints": move} if isinstance(move, list) else move
+        ),
     ]
     """Posture at the end: next (where the next part begins best), the name of a posture, or {joints: [...]}."""
 
@@ -320,9 +324,7 @@ def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
 def _find_wrong_end(parts: Sequence[Part], end: object) -> Iterator[Mistake]:
     """Yield the mistake of a program whose last move leads to no given posture."""
     ways = [number for number, part in enumerate(parts) if part.kind in WAYS]
-    if not ways or getattr(parts[ways[-1]], "move", None) != NEXT:
-        return
-    if end == "free":
+    if end == "free" and ways and getattr(parts[ways[-1]], "move", None) == NEXT:
         yield (
             f"program[{ways[-1]}].move",
             "the last move leads to a posture that nothing determines",

@@ -166,12 +166,7 @@ def rows_of(
 
 
 def check_events(motion: Trajectory) -> None:
-    """Refuse events before or after the motion.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse events before or after the motion, by an InputError."""
     for issue in check_times(motion.events, motion.t_end):
         raise InputError(
             issue.message, where=issue.where, found=issue.found, allowed=issue.usual
