@@ -185,3 +185,17 @@ def test_a_moved_post_costs_what_its_gradient_says():
     found = (times[0] - times[1]) / (2.0 * STEP)
     assert abs(found) > 0.01
     assert by_post[axis] == pytest.approx(found, rel=0.05)
+
+
+def test_parts_planned_one_by_one_have_no_gradients_by_placement():
+    seam = {"line": {"by": [0.1, 0.2]}, "speed": 0.2}
+    result = brachis.plan(
+        "gantry2",
+        start=[0.1, 0.1],
+        task_space=["x", "y"],
+        program=[{"move": "next"}, {"path": [seam], "path_start": [0.3, 0.2]}],
+        effort="single",
+    )
+    notes = {entry.subject: entry.note for entry in result.gradients}
+    assert "parts were planned one by one" in notes["path"]
+    assert notes["base"] == notes["path"]

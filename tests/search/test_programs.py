@@ -4,6 +4,7 @@ The full count of programs is `benchmarks/programs.py`.
 """
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,13 @@ import pytest
 import brachis
 from brachis.common.deadline import NEVER
 from brachis.common.progress import ignore
-from brachis.errors import PathError, PlausibilityError, StartError, TaskError
+from brachis.errors import (
+    InputError,
+    PathError,
+    PlausibilityError,
+    StartError,
+    TaskError,
+)
 from brachis.optimise.links import PostureLink
 from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
@@ -40,6 +47,7 @@ SEAM = {
         {"name": "arc_off", "at": "end", "lead": -0.01},
     ],
 }
+FAST = {"tool_limits": {"process_speed": {"speed": 0.2, "s": [0.2, 0.8]}}}
 CYCLE = {
     "start": HOME,
     "end": "start",
@@ -94,6 +102,27 @@ def test_two_moves_with_a_dwell_between_them(slide):
     ways = [least_time(0.5), 0.3, least_time(0.2)]
     durations = [part.duration for part in result.trajectory.parts]
     np.testing.assert_allclose(durations, ways, rtol=1e-3)
+
+
+@pytest.mark.parametrize("moves", [[0.0], [0.0, 0.5], [0.5, 0.5], [0.5, 0.0]])
+def test_a_move_to_where_the_arm_is_is_refused(slide, moves):
+    program = [{"move": {"joints": [place]}} for place in moves]
+    wrong = {(0.5, 0.5): 1, (0.5, 0.0): 2}.get(tuple(moves), 0)
+    program.append({"move": {"joints": [0.0]}})
+    with pytest.raises(PathError, match=rf"program\[{wrong}\].move: .*already in this"):
+        plan_slide(slide, program, start=[0.0])
+
+
+def test_a_path_that_begins_where_the_arm_is_needs_no_move(slide):
+    def path_from(begin, end):
+        return {"path": [{"line": {"to": [end]}}], "path_start": [begin]}
+
+    keys = {"start": [0.0], "task_space": ["x"]}
+    with pytest.raises(PathError, match="move 1: the arm is already in this posture"):
+        plan_slide(slide, [{"move": "next"}, path_from(0.1, 0.5)], **keys)
+    paths = [path_from(0.2, 0.3), path_from(0.3, 0.5)]
+    result = plan_slide(slide, paths, order="free", **keys)
+    assert [part.kind for part in result.trajectory.parts] == ["move", "path", "path"]
 
 
 def test_a_closed_motion_without_a_given_start(slide):
@@ -453,6 +482,16 @@ def test_a_free_order_visits_seams_along_the_way():
             r"program\[2\].path_start: this key is missing: .*convention$",
         ),
         ({"program": []}, "program: the program is empty"),
+        ({"program": [SEAM, None]}, r"program\[1\]: a part needs .*; found null"),
+        ({"program": [3]}, r"program\[0\]: a part needs exactly one kind; found 3"),
+        (
+            {"program": [{"move": {"joints": HOME}}], "start": "free"},
+            "start: this key is missing",
+        ),
+        (
+            {"program": [{**FAST, "move": "next"}, SEAM, {"move": "next"}]},
+            "move 1: tool_limits.process_speed: a move has no path",
+        ),
         (
             {"program": [{"move": "next", "velocity": 1.0}, SEAM]},
             r"belongs elsewhere: program\[0\].limits.velocity$",
@@ -578,7 +617,7 @@ def test_keys_of_segments_are_those_of_the_part():
 
 
 def test_a_move_from_nowhere_is_refused():
-    with pytest.raises(TaskError, match="nothing determines"):
+    with pytest.raises(TaskError, match="start: this key is missing"):
         brachis.plan("iiwa14", **{**CYCLE, "start": "free", "end": "free"})
 
 
@@ -617,3 +656,19 @@ def test_events_outside_the_motion_are_told(slide):
     (issue,) = result.warnings
     late_time = f"{result.t_end + 0.01:.4f}"
     assert issue.found == f"arc_on -0.0200 s, arc_off {late_time} s"
+
+
+@pytest.mark.parametrize("profile", [None, "kuka_rsi_4ms"])
+def test_events_outside_the_motion_are_not_exported(slide, profile, tmp_path):
+    early = {"name": "process_on", "lead": 0.02}
+    move = {"move": {"joints": [0.5]}, "events": [early]}
+    with pytest.warns(PlausibilityWarning, match="add a move before"):
+        result = plan_slide(slide, [move], start=[0.0])
+    match = "events.process_on: .*found -0.0200 s; .*change its lead"
+    write = brachis.export.write
+    path = tmp_path / "motion.csv"
+    if profile is not None:
+        write = partial(brachis.export.write_for_controller, profile=profile)
+        path = tmp_path / "motion.src"
+    with pytest.raises(InputError, match=match):
+        write(result, path)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from brachis import examples, robots
+from brachis import Program, examples, robots
 from brachis.errors import TaskError
 from brachis.task import FROM_URDF, LineBy, load_task
 
@@ -549,3 +549,20 @@ def test_suggestions_are_no_words_of_a_sentence(key, word):
     with pytest.raises(TaskError) as caught:
         load_task(examples.scara_line, changes={key: word})
     assert "Did you mean" not in str(caught.value)
+
+
+def test_found_values_are_written_as_in_a_file():
+    change = {"payload": None, "events": [{"name": "x"}]}
+    with pytest.raises(TaskError, match=r"found \[\{name: 'x'\}\] \(a list\)"):
+        load_task(
+            {
+                "brachis": 1,
+                "start": {"joints": [0.0]},
+                "program": [{"move": {"joints": [1.0]}}, change],
+            }
+        )
+
+
+def test_a_move_leads_to_an_array():
+    (move,) = Program([{"move": np.array([0.1, 0.2])}])
+    assert move.move.joints == (0.1, 0.2)

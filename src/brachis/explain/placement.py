@@ -113,8 +113,11 @@ def find_obstacle(problem: Problem, subject: str) -> str:
             to_postures = (
                 getattr(segment.shape, "to_posture", None) for segment in part.task.path
             )
-            if part.given_postures or any(to_postures):
+            given = map(part.task.joints_at, ("start", "end"))
+            if any(given) or any(to_postures):
                 return _HELD
+            if part.given_postures:
+                return "the parts were planned one by one, between the postures in which they meet"
     return ""
 
 

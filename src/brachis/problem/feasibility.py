@@ -68,6 +68,8 @@ def check_postures(
         _check_at_rest(robot, limits, posture, key, tolerance)
         limits = tuple(_widen(limit, posture[None], tolerance) for limit in limits)
     along = path.sample(np.linspace(0.0, 1.0, 401)).target
+    if len(postures) == 2 and not (task_map.m or task.program):
+        check_moves(*postures.values())
     if "end" in postures and task_map.m:
         key = task.posture_key("end")
         check_on_path(task_map, postures["end"], along[-1], "end", key)
@@ -80,6 +82,16 @@ def check_postures(
             for limit in limits
         )
     return limits
+
+
+def check_moves(start: np.ndarray, end: np.ndarray) -> None:
+    """Refuse a move between two equal postures, (n,), by a PathError."""
+    if np.abs(end - start).max() <= tolerances.WRITTEN:
+        raise PathError(
+            "the arm is already in this posture",
+            where="end",
+            allowed="another posture, or no move",
+        )
 
 
 def _widen(limit: Limit, postures: np.ndarray, tolerance: float) -> Limit:

@@ -41,6 +41,7 @@ from brachis.task import (
 )
 from brachis.task.fields import POSITION
 from brachis.task.limit_models import without_defaults
+from brachis.task.load import with_start
 from brachis.task.messages import validate
 from brachis.task.orientation import ToolPose
 from brachis.task.points.units import quaternions_of
@@ -310,7 +311,7 @@ def _task_of(
         "tool_limits": limited.tool_limits or task.tool_limits,
     }
     if isinstance(limited, MovePart):
-        return task.model_copy(update=changes)
+        return _checked(task, changes)
     changes |= path_keys(limited)
     segments = _segments(stretch)
     ending = segments[-1].model_copy(update={"stop": False, "dwell": 0.0})
@@ -328,9 +329,9 @@ def _task_of(
         )
     if approaches or retracts:
         free = {"end": "free", "start": "free" if approaches else stated["start"]}
-        plain = task.model_copy(update=changes | free)
+        plain = _checked(task, changes | free)
         _, task_map = bind(robot, plain.task_space, plain.tolerances)
-        path = path_of(task_map, validate(Task, plain, ""))
+        path = path_of(task_map, plain)
         if approaches:
             changes["path_start"] = _pose(path, 0.0, approaches[0].approach)
             to = tuple(_pose(path, 0.0).position)
@@ -343,7 +344,12 @@ def _task_of(
             stopping = segments[-1].model_copy(update={"stop": True})
             line = LineSegment(line=LineTo(to=tuple(away.position)))
             changes["path"] = (*changes["path"][:-1], stopping, line)
-    return validate(Task, task.model_copy(update=changes), "")
+    return _checked(task, changes)
+
+
+def _checked(task: Task, changes: Mapping[str, Any]) -> Task:
+    """Return a task with changes, whose path may state where it begins."""
+    return with_start(validate(Task, task.model_copy(update=changes), ""), "")
 
 
 def _variants(stretch: _Stretch, task: Task, path: Path) -> Iterator[Task]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from brachis import ik
+from brachis.common import tolerances
 from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import BrachisError, PathError, TaskError
@@ -116,8 +117,6 @@ def find_batches(
     ------
     PathError
         No joint path of one of the paths was found.
-    TaskError
-        Nothing determines the posture in which the program begins.
     """
     if not isinstance(problem, ProblemChain):
         yield from batches(problem, decompositions, deadline, listener)
@@ -183,6 +182,12 @@ class _ChainSearch:
         problem = self.problem
         options = chain.parts
         if problem.task.order == "free":
+            options = [
+                option
+                for option in options
+                if option.guess
+                or np.ptp(option.ends, axis=0).max() > tolerances.WRITTEN
+            ]
             problem = problem.only([option.number for option in options])
         else:
             options.sort(key=lambda option: option.number)
@@ -210,13 +215,6 @@ class _ChainSearch:
         parts = self.problem.parts
         first = 0
         if not begun.options:
-            if not (self.problem.is_closed or parts[0].task_map.m):
-                raise TaskError(
-                    "nothing determines the posture in which the program begins",
-                    where="start",
-                    found="free, before a move",
-                    allowed="a posture; or end: start, for a motion that closes",
-                )
             # A motion that closes may be searched from any path on.
             first = next(i for i, part in enumerate(parts) if part.task_map.m)
         chains = [begun]

@@ -9,6 +9,7 @@ from brachis.common.deadline import Deadline
 from brachis.common.progress import Listener
 from brachis.errors import PathError, TaskError
 from brachis.kinematics import CHART, ChartRows, chart_around
+from brachis.problem.feasibility import check_moves
 from brachis.problem.problem import Problem
 from brachis.search.guesses import SCREENED, SearchLevel
 from brachis.search.holding import explain_postures
@@ -43,7 +44,7 @@ def move_guesses(
     TaskError
         The start or end posture is missing.
     PathError
-        No joint path was found.
+        No joint path was found, or both postures are the same.
     NotInstalledError
         Something is in the way, and OMPL is missing.
     """
@@ -55,6 +56,7 @@ def move_guesses(
                 found="free",
                 allowed="a posture",
             )
+    check_moves(*problem.given_postures.values())
     ends = np.array([problem.start, problem.end])
     straight = guess_along(problem, ends, "line")
     space = FreeSpace.of(problem)
@@ -98,8 +100,7 @@ def guess_along(problem: Problem, q: np.ndarray, origin: str) -> InitialGuess:
     """Return the guess of a move along the joint path through postures, (S, n)."""
     steps = np.abs(np.diff(q, axis=0) / problem.robot.scales).max(axis=1)
     length = np.append(0.0, np.cumsum(steps))
-    # A move between two equal postures has no length.
-    s = length / length[-1] if length[-1] else np.linspace(0.0, 1.0, len(q))
+    s = length / length[-1]
     stations = np.union1d(s, np.linspace(0.0, 1.0, _STATIONS))
     postures = interpolate_columns(stations, s, q)
     rows = ChartRows.constant(np.eye(problem.robot.n))

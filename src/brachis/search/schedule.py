@@ -131,7 +131,7 @@ def has_charts(problem: Problem, decompositions: Sequence[Decomposition]) -> boo
     is_open = task.redundant_joints == task.branch == "auto"
     if not is_open or task.search.guesses != "lattice":
         return False
-    return problem.r > 0 or not decompositions
+    return problem.task_map.is_of_tool and (problem.r > 0 or not decompositions)
 
 
 def _batches_with_fallbacks(

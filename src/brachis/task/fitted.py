@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from brachis.common.files import read_text
 from brachis.common.words import write_count
@@ -25,6 +25,7 @@ from brachis.task.points.curves import FittedCurve, cut_at_corners, fit_curves
 from brachis.task.points.gcode import SUFFIXES, read_gcode
 from brachis.task.points.points import Points, Rows, points_from
 from brachis.task.points.tables import read_points, read_table
+from brachis.task.program import PathPart
 from brachis.task.segments import (
     BSplineSegment,
     CsvSegment,
@@ -33,6 +34,7 @@ from brachis.task.segments import (
     SplineThrough,
 )
 
+_P = TypeVar("_P", Task, PathPart)
 _HAS_UNIT = re.compile(r"[_ (\[](deg|degrees|mm|cm)[)\]]?$", re.IGNORECASE)
 """Ending of a column name that states a unit other than rad or m."""
 
@@ -169,14 +171,29 @@ def expand_csv_files(task: Task, source: str, folder: Path) -> Task:
     TaskError
         A file is missing or wrong; the message names the line.
     """
+    parts = [
+        _expand(
+            part, part.task_space or task.task_space, f"{source}: program[{i}].", folder
+        )
+        if isinstance(part, PathPart)
+        else part
+        for i, part in enumerate(task.program)
+    ]
+    if parts:
+        return task.model_copy(update={"program": tuple(parts)})
+    return _expand(task, task.task_space, f"{source}: ", folder)
+
+
+def _expand(stated: _P, rows: Rows, where: str, folder: Path) -> _P:
+    """Return a task or a part of a program, given with the beginning of its keys, without file segments."""
     path: list[Segment] = []
-    for i, segment in enumerate(task.path):
+    for i, segment in enumerate(stated.path):
         if isinstance(segment, CsvSegment):
-            path += _read(segment, task.task_space, f"{source}: path[{i}]", folder)
+            path += _read(segment, rows, f"{where}path[{i}]", folder)
         else:
             path.append(segment)
     # The empty path of a move stays unset: a task with path: [] is wrong.
-    return task.model_copy(update={"path": tuple(path)}) if path else task
+    return stated.model_copy(update={"path": tuple(path)}) if path else stated
 
 
 def _read(

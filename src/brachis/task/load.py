@@ -291,11 +291,11 @@ def task_from(
         task = validate(Task, content, source)
     except RecursionError:
         raise TaskError("the task contains itself", where=source) from None
-    task = _with_start(expand_csv_files(task, source, folder), source)
+    task = with_start(expand_csv_files(task, source, folder), source)
     return _with_absolute_files(task, folder)
 
 
-def _with_start(task: Task, source: str) -> Task:
+def with_start(task: Task, source: str) -> Task:
     """Fill in the start of the path (for a joint path the start posture) from the first segment if it is missing.
 
     Raises

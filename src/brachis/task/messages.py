@@ -97,7 +97,15 @@ def show(value: object) -> str:
         keys = _shorten(", ".join(map(str, value)))
         return f"a mapping with the keys {keys}" if keys else "an empty mapping"
     if isinstance(value, list | tuple):
-        return f"{_shorten(repr(list(value)))} (a list)"
+        items = [
+            item.model_dump(mode="json", exclude_unset=True)
+            if isinstance(item, Model)
+            else item
+            for item in value
+        ]
+        # As in YAML, keys have no quotes.
+        text = re.sub(r"'(\w+)':", r"\1:", repr(items))
+        return f"{_shorten(text)} (a list)"
     text = repr(value)
     return type(value).__name__ if "\n" in text else _shorten(text)
 
@@ -282,9 +290,8 @@ def _wrong_keys(detail: ErrorDetails, model: type[Model]) -> _Parts:
     known = re.findall(r"\w+", allowed)
     models = _models_at(detail["loc"], model)
     keys = {*known, *_keys_at(detail["loc"], model)}
-    unknown = [
-        name for name in content if isinstance(content, Mapping) and name not in keys
-    ]
+    stated = content if isinstance(content, Mapping) else {}
+    unknown = [name for name in stated if name not in keys]
     for name in unknown:
         hint = _KEYS_OF_OTHERS.get(name) or suggest(name, known)
         if hint:

@@ -318,9 +318,9 @@ class Task(CheckedModel):
         if is_needed and not is_stated:
             if self.task_space == "joints":
                 yield (
-                    "start",
+                    "path[0]",
                     "a joint path that does not begin with a waypoint needs a start posture",
-                    "{joints: [...]}",
+                    "spline or csv; or a posture before the path: start or move with {joints: [...]}",
                 )
             yield (
                 "path_start",

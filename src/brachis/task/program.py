@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from brachis.common.words import write_count
 from brachis.task.fields import (
@@ -129,6 +129,10 @@ class MovePart(LimitedPart):
     move: Annotated[
         Name | Posture,
         ByForm("next, the name of a posture, or a mapping {joints: [...]}"),
+        # A program in Python may give an array.
+        BeforeValidator(
+            lambda move: {"joints": move} if isinstance(move, list) else move
+        ),
     ]
     """Posture at the end: next (where the next part begins best), the name of a posture, or {joints: [...]}."""
 
@@ -290,9 +294,9 @@ def find_mistakes(
     mistakes = [
         _find_wrong_names(parts),
         _find_wrong_order(parts),
-        _find_wrong_start(parts),
+        _find_wrong_start(parts, start, end),
         _find_wrong_flights(parts, is_closed=end == "start"),
-        _find_wrong_end(parts, start, end),
+        _find_wrong_end(parts, end),
     ]
     if order == "free":
         mistakes[1:] = [_find_mistakes_if_free(parts)]
@@ -317,26 +321,14 @@ def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
             )
 
 
-def _find_wrong_end(
-    parts: Sequence[Part], start: object, end: object
-) -> Iterator[Mistake]:
-    """Yield the mistakes at the end of a program whose last move leads to no given posture."""
+def _find_wrong_end(parts: Sequence[Part], end: object) -> Iterator[Mistake]:
+    """Yield the mistake of a program whose last move leads to no given posture."""
     ways = [number for number, part in enumerate(parts) if part.kind in WAYS]
-    if not ways or getattr(parts[ways[-1]], "move", None) != NEXT:
-        return
-    key = f"program[{ways[-1]}].move"
-    begins_anywhere = getattr(parts[ways[0]], "move", None) == NEXT and start == "free"
-    if end == "free":
+    if end == "free" and ways and getattr(parts[ways[-1]], "move", None) == NEXT:
         yield (
-            key,
+            f"program[{ways[-1]}].move",
             "the last move leads to a posture that nothing determines",
             "a posture in this move, or end",
-        )
-    elif end == "start" and begins_anywhere:
-        yield (
-            key,
-            "the last move meets the first one in a posture that nothing determines",
-            "a start posture, or a program that begins with a path",
         )
 
 
@@ -381,18 +373,28 @@ def _find_wrong_order(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "two moves meet in a posture that nothing determines",
                 "a posture, or a path after the move",
             )
-        if isinstance(part, MovePart) and before == "move":
-            earlier = parts[numbers[numbers.index(number) - 1]]
-            if getattr(earlier, "move", None) == part.move:
-                yield f"{key}.move", "the arm is in this posture", "another posture"
 
 
-def _find_wrong_start(parts: Sequence[Part]) -> Iterator[Mistake]:
-    """Yield the mistakes of a program that does not begin with a motion."""
-    if parts and not any(part.kind in WAYS for part in parts):
+def _find_wrong_start(
+    parts: Sequence[Part], start: object, end: object
+) -> Iterator[Mistake]:
+    """Yield the mistakes of a program that does not begin with a motion from somewhere."""
+    kinds = [part.kind for part in parts if part.kind in WAYS]
+    if parts and not kinds:
         yield "program", "nothing moves", "at least one path or move"
     elif parts and parts[0].kind == "dwell":
         yield "program[0]", "the arm waits before it has moved", "a path or move first"
+    elif (
+        start == "free"
+        and kinds[:1] == ["move"]
+        # A motion that closes begins where its last path ends.
+        and (end != "start" or kinds[-1] == "move")
+    ):
+        yield (
+            "start",
+            "this key is missing: nothing else states where the program begins",
+            "a posture",
+        )
 
 
 def _find_wrong_flights(parts: Sequence[Part], *, is_closed: bool) -> Iterator[Mistake]:

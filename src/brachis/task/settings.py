@@ -49,9 +49,10 @@ class Placement(Model):
             return content
         from pinocchio import rpy
 
+        # Without the noise of products, files show the digits that the user gave.
         matrix = np.array(content.homogeneous)
-        angles = np.degrees(rpy.matrixToRpy(matrix[:3, :3]))
-        return {"xyz": matrix[:3, 3].tolist(), "rpy_deg": angles.tolist()}
+        angles = np.degrees(rpy.matrixToRpy(matrix[:3, :3])).round(12)
+        return {"xyz": matrix[:3, 3].round(12).tolist(), "rpy_deg": angles.tolist()}
 
     @property
     def transform(self) -> SE3:

@@ -65,7 +65,9 @@ class Event:
 def check_times(events: Sequence[Event], t_end: float) -> tuple[Issue, ...]:
     """Find events before or after a motion that takes `t_end`, s: their leads are longer than what is around them."""
     message = "the event is not during the motion"
-    usual = f"0 to {t_end:.4f} s; change its lead"
+    usual = (
+        f"0 to {t_end:.4f} s; change its lead, or add a move before or a dwell after it"
+    )
     return tuple(
         Issue(f"events.{event.name}", message, f"{event.time:.4f} s", usual)
         for event in events

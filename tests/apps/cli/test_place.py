@@ -15,6 +15,7 @@ def test_a_faster_place_is_printed_and_written(run, write, tmp_path):
     text = run(*command.split()).out
     before, after = re.findall(r"end time (?:before|after)\W+(\S+) s", text)
     assert float(after) < float(before)
+    assert f"wrote {out}" in text
     assert re.search(r"base\W+yaw\W+\S+ s/rad", text)
     assert brachis.load_task(out).frames["workpiece"].xyz[0] != 0.0
     again = run(*command.split(), code=2)

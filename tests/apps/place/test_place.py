@@ -2,11 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pinocchio
 import pytest
+import yaml
 
 import brachis
 from brachis.apps.place import read_range, write_task
 from brachis.errors import InputError, UnknownNameError
+from brachis.robot.plausibility import PlausibilityWarning
+from brachis.task import Placement
 from support.movable import TASK
 
 RANGES = {"x": (-0.4, 0.2), "yaw_deg": (-30.0, 30.0)}
@@ -97,6 +102,30 @@ def test_places_out_of_reach_are_passed_over():
     assert max(times) == float("inf")
     assert placing.after.verified
     assert len(placing.to_dict()["trials"]) < len(times)
+
+
+def test_a_range_in_mm_is_told():
+    with pytest.warns(PlausibilityWarning, match="ranges.x: the range looks like mm"):
+        placing = brachis.place(TASK, ranges={"x": (0.0, 400.0)}, starts=2, steps=0)
+    shown = placing.summary()
+    assert shown["by"].startswith("nothing: no other place is faster")
+    assert shown["places tried"] == "2, 1 without a verified motion"
+
+
+def test_a_written_program_has_its_task_space():
+    path = {key: TASK[key] for key in ("path", "path_start")}
+    content = {key: value for key, value in TASK.items() if key not in path}
+    content |= {"program": [path, {"move": "next"}], "end": "start"}
+    placing = brachis.place(content, ranges={"x": (-0.1, 0.0)}, starts=1, steps=0)
+    written = yaml.safe_load(write_task(placing.task))
+    assert written["task_space"] == ["x", "y"]
+    assert "task_space" not in written["program"][0]
+    assert brachis.load_task(written) == placing.task
+
+
+def test_a_placement_has_no_noise_of_products():
+    third = pinocchio.SE3(np.eye(3), np.array([0.1, 0.0, 0.0]))
+    assert Placement.model_validate(third * third * third).xyz[0] == 0.3
 
 
 def test_what_cannot_be_moved_is_refused():

@@ -340,6 +340,8 @@ def place(
             print_table("placement", ("", ""), placing.summary().items())
         rows = [entry.row for entry in entries]
         print_table("gradients", ("what", "change", "derivative of t_E"), rows)
+        if out is not None:
+            print_lines(f"wrote {out}")
     raise typer.Exit(0 if after.verified else 1)
 
 

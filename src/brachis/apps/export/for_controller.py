@@ -21,7 +21,7 @@ from brachis.apps.controller import (
 )
 from brachis.apps.export.formats import FORMATS, name_format
 from brachis.apps.export.programs import ProgramReport, write_program
-from brachis.apps.export.rows import JointRows
+from brachis.apps.export.rows import JointRows, check_events
 from brachis.common.files import atomic_write, file_name
 from brachis.errors import BrachisWarning, InputError, check_names
 from brachis.robot.custom_limits import LimitModel
@@ -94,6 +94,7 @@ def write_for_controller(
     True
     """
     motion = motion_of(trajectory)
+    check_events(motion)
     profile = load_profile(profile)
     axes = axes_for(motion, profile)
     tables = [known for known, table in FORMATS.items() if table.step is None]

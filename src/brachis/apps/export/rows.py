@@ -14,10 +14,12 @@ from brachis.apps.controller import FACTORS
 from brachis.common.arguments import check_once
 from brachis.errors import (
     BrachisWarning,
+    InputError,
     NotInstalledError,
     check_names,
 )
 from brachis.trajectory import Event, MotionPart, Samples, Trajectory
+from brachis.trajectory.program import check_times
 from brachis.trajectory.samples import COLUMNS
 
 _PER = {"q": "", "qd": "/s", "qdd": "/s^2", "tau": None}
@@ -119,7 +121,7 @@ def rows_of(
     Raises
     ------
     InputError
-        `dt` or `last` cannot be used, or a joint is given twice.
+        `dt` or `last` cannot be used, a joint is given twice, or an event is not during the motion.
     UnknownNameError
         A joint does not exist.
 
@@ -128,6 +130,7 @@ def rows_of(
     LeftOutWarning
         A joint that moves is not among `joints`.
     """
+    check_events(trajectory)
     names = trajectory.joint_names
     real = names[: len(trajectory.robot.urdf_joints)]
     chosen = list(real if joints is None else joints)
@@ -160,6 +163,14 @@ def rows_of(
         parts=trajectory.parts,
         events=trajectory.events,
     )
+
+
+def check_events(motion: Trajectory) -> None:
+    """Refuse events before or after the motion, by an InputError."""
+    for issue in check_times(motion.events, motion.t_end):
+        raise InputError(
+            issue.message, where=issue.where, found=issue.found, allowed=issue.usual
+        )
 
 
 def require_library(

@@ -13,6 +13,7 @@ from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.explain.placement import COORDINATES
 from brachis.result import Result
+from brachis.robot.plausibility import issue_above, report_issues
 from brachis.task import Task
 
 RANGES = {
@@ -82,13 +83,14 @@ class Placing(Summary):
 
     def summary(self) -> Mapping[str, object]:
         """Return the entries that are shown to the user."""
+        times = [trial.t_end for trial in self.trials]
         return {
             "moved": self.moved,
-            "by": write_change(self.change) or "nothing",
+            "by": write_change(self.change) or "nothing: no other place is faster",
             "end time before": write_end_time(self.before),
             "end time after": write_end_time(self.after),
             "gain": f"{100.0 * self.gain:.1f} %",
-            "places tried": len(self.trials),
+            "places tried": f"{len(times)}, {times.count(np.inf)} without a verified motion",
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -117,6 +119,12 @@ def write_end_time(result: Result) -> str:
 def write_task(task: Task) -> str:
     """Write a task as YAML, without the keys that have their defaults."""
     content = task.model_dump(mode="json", exclude_defaults=True)
+    paths = [part for part in content.get("program", ()) if "path" in part]
+    spaces = [part["task_space"] for part in paths]
+    if spaces and spaces == spaces[:1] * len(spaces):
+        content["task_space"] = spaces[0]
+        for part in paths:
+            del part["task_space"]
     return yaml.safe_dump({"brachis": task.brachis, **content}, sort_keys=False)
 
 
@@ -168,3 +176,8 @@ def check_ranges(ranges: Mapping[str, tuple[float, float]]) -> None:
                 found=pair,
                 allowed="two numbers with 0, the present place, between them or at an end, such as (-0.2, 0.2)",
             )
+        if not name.endswith("_deg"):
+            wide = "the range looks like mm"
+            size = float(np.abs(values).max())
+            issues = issue_above(f"ranges.{name}", wide, size, 10.0, "m")
+            report_issues(tuple(issues), strict=None)
