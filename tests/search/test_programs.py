@@ -18,11 +18,11 @@ from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.transcription import program_of
 from brachis.problem.program import bind_task
-from brachis.robot.from_task import robot_for
+from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.chain import find_batches
 from brachis.search.phase_plane import initial_guess
-from brachis.task import part_names, scene_during
+from brachis.task import ToolLimits, part_names, scene_during, task_with
 from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
@@ -211,6 +211,34 @@ def test_limits_of_a_part_hold_in_it_alone(slide):
     first, second = (part.duration for part in result.trajectory.parts)
     assert first == pytest.approx(0.5 / 0.5 + 0.5 * MASS / FORCE, rel=1e-3)
     assert second == pytest.approx(least_time(0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "robot, limits, velocity",
+    [
+        ({"speed_override": 0.25}, {"velocity": 2.0}, 0.5),
+        ({"speed_override": 0.25}, {"scale": {"velocity": 0.5}}, 0.25),
+        ({"limits": {"scale": {"velocity": 0.25}}}, {"velocity": {"x_axis": 2.0}}, 0.5),
+        ({"limits": {"scale": {"velocity": 0.25}}}, {"scale": {"velocity": 0.5}}, 1.0),
+        ({"limits": {"velocity": 0.25}}, {"acceleration": 100.0}, 0.25),
+    ],
+)
+def test_a_part_replaces_the_same_limits_and_no_factors(robot, limits, velocity):
+    task = task_with(
+        robot={"urdf": "gantry2", **robot},
+        start=[0.1, 0.1],
+        tool_limits={"speed": 0.2},
+        program=[
+            {
+                "move": {"joints": [0.9, 0.1]},
+                "limits": limits,
+                "tool_limits": {"acceleration": 100.0},
+            }
+        ],
+    )
+    (part,) = bind_task(robot_from_settings(task.robot), task).parts
+    assert part.robot.limits.velocity[0] == pytest.approx(velocity)
+    assert part.task.tool_limits == ToolLimits(speed=0.2, acceleration=100.0)
 
 
 def test_two_paths_with_different_limits_meet(slide):

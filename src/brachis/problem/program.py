@@ -21,6 +21,7 @@ from brachis.problem.chain import ProblemChain, Section, key_in_program
 from brachis.problem.problem import Problem
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
+from brachis.robot.from_task import replace_limits
 from brachis.task import (
     FREE,
     ApproachPart,
@@ -40,7 +41,6 @@ from brachis.task import (
     scene_during,
 )
 from brachis.task.fields import POSITION
-from brachis.task.limit_models import without_defaults
 from brachis.task.messages import validate
 from brachis.task.orientation import ToolPose
 from brachis.task.points.units import quaternions_of
@@ -283,7 +283,7 @@ def _robot_of(robot: Robot, stretch: _Stretch) -> Robot:
         robot = robot.with_payload(**stated)
     for part in stretch.of(LimitedPart)[:1]:
         if part.limits is not None:
-            robot = robot.with_limits(**without_defaults(part.limits))
+            robot = replace_limits(robot, part.limits)
     return robot
 
 
@@ -302,12 +302,15 @@ def _task_of(
         )
     task = task.with_scene(stretch.scene)
     limited = stretch.of(LimitedPart)[0]
+    tool_limits = limited.tool_limits or ToolLimits()
+    stated_keys = tool_limits.model_dump(exclude_defaults=True)
+    own = {key: getattr(tool_limits, key) for key in stated_keys}
     changes: dict[str, Any] = {
         "program": (),
         "order": "given",
         "robot": robot.settings,
         **stated,
-        "tool_limits": limited.tool_limits or task.tool_limits,
+        "tool_limits": task.tool_limits.model_copy(update=own),
     }
     if isinstance(limited, MovePart):
         return task.model_copy(update=changes)

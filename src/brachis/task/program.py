@@ -83,9 +83,9 @@ class LimitedPart(FlyingPart):
     """A part with limits of its own."""
 
     tool_limits: ToolLimits | None = None
-    """Limits on the tool in this part. Null: those of the task."""
+    """Limits on the tool in this part, in place of the same ones of the task."""
     limits: LimitSpec | None = None
-    """Joint limits in this part. Null: those of the robot."""
+    """Joint limits in this part, in place of the same ones of the robot; its factors apply to them too."""
 
 
 class PathPart(LimitedPart):

@@ -9,8 +9,9 @@ from brachis.apps.controller.axes import ControllerAxes
 from brachis.apps.controller.profile import Profile
 from brachis.errors import InputError
 from brachis.robot import Robot
+from brachis.robot.from_task import replace_limits
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import LIMIT_KINDS
+from brachis.task import LIMIT_KINDS, LimitSpec
 from brachis.task.limit_models import FROM_URDF, map_by_joint
 
 
@@ -50,11 +51,14 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
             number = robot.joint_names.index(joint)
             low, high = value if isinstance(value, tuple) else (-value, value)
             pair = (max(lower[number], low), min(upper[number], high))
+            if kind == "velocity":
+                override = robot.settings.speed_override
+                pair = (pair[0] / override, pair[1] / override)
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
     if not changes:
         return robot
-    return unscaled.with_limits(**changes).with_limits(scale=scale_of(robot))
+    return replace_limits(robot, LimitSpec(**changes))
 
 
 def scale_of(robot: Robot) -> dict[str, float]:
