@@ -32,6 +32,7 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     unscaled = without_scale(robot)
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
+        usual = LIMIT_KINDS[kind].usual
         needs_masses = LIMIT_KINDS[kind].needs_masses and not robot.has_masses
         if stated in (None, FROM_URDF) or needs_masses:
             continue
@@ -51,7 +52,7 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
             number = robot.joint_names.index(joint)
             low, high = value if isinstance(value, tuple) else (-value, value)
             pair = (max(lower[number], low), min(upper[number], high))
-            if kind == "velocity":
+            if usual and usual.overridden:
                 override = robot.settings.speed_override
                 pair = (pair[0] / override, pair[1] / override)
             is_pair = LIMIT_KINDS[kind].form == "pair"
