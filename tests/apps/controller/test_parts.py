@@ -37,6 +37,23 @@ def test_a_run_beyond_the_limits_of_one_part_fails(cycle):
     assert "move 1" in failure
 
 
+def test_differences_go_on_where_parts_meet():
+    """A part that begins between two samples, or in motion, does not begin from rest."""
+    parts = [
+        {"move": {"joints": [0.3]}, "fly": True, "limits": {"acceleration": 3.0}},
+        {"move": {"joints": [0.7]}},
+        {"move": {"joints": [0.1]}},
+    ]
+    slide = slides([X], [16.0], 2.0, gravity=[0, 0, 0])
+    robot = {"limits": {"acceleration": 5.0}}
+    result = brachis.plan(slide, program=parts, start=[0.0], robot=robot, **QUICK)
+    run = brachis.verify_run(result, "kuka_rsi_4ms")
+    assert run.passed
+    checks = {check.name: check for check in run.checks}
+    rate = checks["acceleration by differences"]
+    assert rate.value == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_run_is_on_the_path_of_each_part(cycle):
     """The whole motion has no path; each part is compared with its own."""
     motion = cycle.trajectory
