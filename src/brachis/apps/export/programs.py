@@ -25,6 +25,7 @@ from brachis.common.arrays import apply_each
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.robot import Robot
+from brachis.task import part_names
 from brachis.trajectory import Trajectory
 
 BLEND = 0.25
@@ -468,11 +469,20 @@ def _events(motion: Trajectory, profile: Profile) -> dict[float, str]:
 def _process_events(
     motion: Trajectory, profile: Profile
 ) -> Iterator[tuple[float, str]]:
-    """Yield the times, s, and instructions at which a process begins or ends."""
+    """Yield the times, s, and instructions at which a process begins or ends, unless its part has such an event."""
+    program = motion.task.program
+    named = dict(zip(part_names(program), program, strict=True))
     is_process = [phase.kind == "given speed" for phase in motion.phases]
     ends = [0.0, *motion.phase_ends.tolist()]
     changes = pairwise([False, *is_process, False])
     for time, (before, after) in zip(ends, changes, strict=True):
         name = "process_on" if after else "process_off"
-        if before != after and name in profile.events:
+        inside = time + (_SAME_TIME if after else -_SAME_TIME)
+        stated = [
+            event.name
+            for part in motion.parts
+            if part.begin < inside < part.end and part.name in named
+            for event in named[part.name].events
+        ]
+        if before != after and name in profile.events and name not in stated:
             yield time, profile.events[name]
