@@ -241,6 +241,46 @@ def test_a_part_replaces_the_same_limits_and_no_factors(robot, limits, velocity)
     assert part.task.tool_limits == ToolLimits(speed=0.2, acceleration=100.0)
 
 
+@pytest.mark.parametrize(
+    "parts, key",
+    [
+        ([{"payload": {"mass": 60.0}}], "program[1].payload.mass"),
+        ([], "robot.payload.mass"),
+    ],
+)
+def test_the_payload_that_is_too_heavy_is_named(parts, key):
+    home = {"joints": HOME}
+    program = [{"move": {"joints": [0.3, *HOME[1:]]}}, *parts, {"move": home}]
+    robot = {"urdf": "iiwa14"} | ({} if parts else {"payload": {"mass": 60.0}})
+    task = task_with(robot=robot, start=home, program=program)
+    with pytest.raises(StartError) as caught:
+        bind_task(robot_from_settings(task.robot), task)
+    (remedy,) = caught.value.remedies
+    assert remedy.key == key
+
+
+@pytest.mark.parametrize(
+    "number, changes, text",
+    [
+        (
+            0,
+            {"limits": {"velocity": 1e-7}},
+            r"program: move 1: .*Set program\[0\].limits.velocity.x_axis in",
+        ),
+        (
+            1,
+            {"path": [{"line": {"by": [0.1, 0.2]}, "speed": 50.0}], "tool_limits": {}},
+            r"Lower program\[1\].path\[0\].speed to .* \(a plan with it was verified",
+        ),
+    ],
+)
+def test_keys_of_parts_are_named_in_advice_that_works(number, changes, text):
+    parts = list(GANTRY_CYCLE["program"])
+    parts[number] = {**parts[number], **changes}
+    with pytest.raises(brachis.BrachisError, match=text):
+        brachis.plan({**GANTRY_CYCLE, "program": parts})
+
+
 def test_two_paths_with_different_limits_meet(slide):
     parts = [
         {"path": [{"line": {"by": [0.5]}}], "limits": {"velocity": 0.5}},

@@ -202,7 +202,7 @@ def check_within_reach(problem: Problem) -> None:
         try:
             _check_path_within_reach(part)
         except PathError as error:
-            error.where = problem.key_of(number, error.where or "", error.s_interval)
+            problem.name_keys(number, error)
             raise
 
 
