@@ -17,6 +17,7 @@ from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.transcription import program_of
+from brachis.problem.plausibility import of_places
 from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.robot.plausibility import PlausibilityWarning
@@ -279,6 +280,18 @@ def test_keys_of_parts_are_named_in_advice_that_works(number, changes, text):
     parts[number] = {**parts[number], **changes}
     with pytest.raises(brachis.BrachisError, match=text):
         brachis.plan({**GANTRY_CYCLE, "program": parts})
+
+
+def test_figures_of_parts_are_checked_like_those_of_the_task():
+    parts = list(GANTRY_CYCLE["program"])
+    parts[0] = {"move": "next", "limits": {"velocity": {"x_axis": 5000.0}}}
+    parts[3] = {"payload": {"mass": 1500.0}}
+    task = task_with({**GANTRY_CYCLE, "program": parts})
+    issues = of_places(bind_task(robot_from_settings(task.robot), task))
+    assert [issue.where for issue in issues] == [
+        "program[0].limits.velocity.x_axis",
+        "program[3].payload.mass",
+    ]
 
 
 def test_two_paths_with_different_limits_meet(slide):
