@@ -32,6 +32,7 @@ MASS = 2.0
 FORCE = 16.0
 """Of a slide, N."""
 HOME = [0.0, 0.5, 0.0, -1.2, 0.0, 1.0, 0.3]
+ARC = {"name": "arc_on"}
 SEAM = {
     "name": "seam",
     "path": [{"line": {"to": [0.5, 0.15, 0.4]}}],
@@ -520,6 +521,15 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [SEAM], "task_space": "free"}, "a path needs a task space"),
         ({"program": [{"move": "nowhere"}]}, "this posture is not defined"),
         ({"program": [SEAM, {"move": "next"}], "order": "free"}, "cannot be free"),
+        ({"program": [SEAM], "order": "free"}, "or leave out order, and add moves"),
+        ({"program": [SEAM, {"payload": None}]}, "no motion follows this change"),
+        ({"program": [{**SEAM, "events": [ARC, ARC]}]}, "seam: an event occurs twice"),
+        ({"program": [{"dwell": -0.1}]}, "found -0.1; allowed: > 0, in s"),
+        ({"scene": [{"box": [0.1, -0.8, 0.1]}]}, "found -0.8; allowed: > 0, in m"),
+        (
+            {"program": [{**SEAM, "events": [{"name": "arc", "lead": 50}]}]},
+            "found 50; allowed: <= 10, in s",
+        ),
         ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
         (
             {

@@ -315,6 +315,11 @@ def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a change of the payload takes no time",
                 "events of the part before or after",
             )
+        if len(set(part.events)) < len(part.events):
+            yield f"program[{number}].events", "an event occurs twice", "each once"
+    if parts and isinstance(parts[-1], PayloadPart):
+        key = f"program[{len(parts) - 1}].payload"
+        yield key, "no motion follows this change", "a part after it"
 
 
 def _find_wrong_end(
@@ -418,7 +423,7 @@ def _find_mistakes_if_free(parts: Sequence[Part]) -> Iterator[Mistake]:
         yield (
             "order",
             f"the order of {write_count(len(paths), 'path')} cannot be free",
-            f"2 to {_MOST_FREE} paths",
+            f"2 to {_MOST_FREE} paths; or leave out order, and add moves",
         )
     for number, part in enumerate(parts):
         if not isinstance(part, PathPart):

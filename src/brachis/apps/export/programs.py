@@ -267,11 +267,13 @@ class _Follower:
             nodes = self.choose(share * tolerance, share * time_tolerance)
             place, time = self.deviate(nodes, self.describe(nodes)["duration"])
             if len(nodes) > _MOST:
+                key = "time_tolerance" if time > time_tolerance else "tolerance"
                 raise InputError(
                     "no program of positions is within the tolerance",
                     where="tolerance",
                     found=f"{place:.3g} m, rad and {time:.3g} s with {_MOST} positions, rounded for the language",
                     allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
+                    hint=f"Raise {key}",
                 )
             if place <= tolerance and time <= time_tolerance:
                 if self.is_linear:
