@@ -13,7 +13,6 @@ from brachis.apps.controller import (
     bind_axes,
     load_profile,
     robot_with_profile,
-    scale_of,
     verify_run,
 )
 from brachis.common.progress import Listener, ignore
@@ -100,7 +99,6 @@ def plan_for_controller(
     if profile.rest == "full" and loaded.spline.vanishing < _FULL_REST:
         spline = loaded.spline.model_copy(update={"rest": "full"})
         loaded = loaded.model_copy(update={"spline": spline})
-    factors = scale_of(robot)
 
     def plan_and_run(
         robot: Robot, start_from: Result | None
@@ -121,7 +119,8 @@ def plan_for_controller(
         if not smaller:
             break
         report(f"run by {profile.title}: {'; '.join(run.failures)}; planning again")
-        factors |= {kind: factors.get(kind, 1.0) * smaller[kind] for kind in smaller}
+        scale = robot.settings.limits.scale
+        factors = {kind: smaller[kind] * getattr(scale, kind) for kind in smaller}
         robot = replace_limits(robot, LimitSpec(scale=factors))
         try:
             result, run = plan_and_run(robot, result)

@@ -108,11 +108,11 @@ def name_keys(
     error.where = key_in_program(error.where or "", sections, before, interval)
     if error.hint:
         error.hint = _rename(error.hint, sections)
-    keys = [key_in_program(remedy.key, sections, before) for remedy in error.remedies]
-    error.remedies = tuple(
-        replace(remedy, key=key.rpartition(": ")[2])
-        for remedy, key in zip(error.remedies, keys, strict=True)
-    )
+    remedies = []
+    for remedy in error.remedies:
+        key = key_in_program(remedy.key, sections, before)
+        remedies.append(replace(remedy, key=key.rpartition(": ")[2]))
+    error.remedies = tuple(remedies)
 
 
 @dataclass(frozen=True, repr=False)

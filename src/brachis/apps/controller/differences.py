@@ -46,11 +46,9 @@ def joint_ratios(run: Trajectory) -> _Ratios:
         for component, rows, _ in run.split_times(run.times):
             limits[rows] = component.robot.limits.both_ways(kind)[:, : len(names)]
         # The controller holds the first position before the motion, and the last one after it.
-        held = (order - 1, order - 1)
-        steps = np.pad(run.q, (held, (0, 0)), mode="edge")
-        rates = np.diff(steps, order, axis=0) / run.times[1] ** order
-        limits = np.pad(limits, (held, (0, 0), (0, 0)), mode="edge")
-        lower, upper = np.moveaxis(sliding_window_view(limits, order + 1, 0), 1, 0)
+        held = np.pad(np.arange(len(run.times)), order - 1, mode="edge")
+        rates = np.diff(run.q[held], order, axis=0) / run.times[1] ** order
+        lower, upper = sliding_window_view(limits[held], order + 1, 0).swapaxes(0, 1)
         ratios = np.maximum(rates / upper.max(-1), rates / lower.min(-1))
         yield kind, order, ratios, names
 

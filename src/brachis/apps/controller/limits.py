@@ -62,12 +62,8 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     return replace_limits(robot, LimitSpec(**changes))
 
 
-def scale_of(robot: Robot) -> dict[str, float]:
-    """Return the factors in ``robot.limits.scale`` that are not 1."""
-    return robot.settings.limits.scale.model_dump(exclude_defaults=True)
-
-
 def without_scale(robot: Robot) -> Robot:
     """Return a robot without the factors in ``robot.limits.scale``."""
-    inverse = {kind: 1.0 / factor for kind, factor in scale_of(robot).items()}
+    scale = robot.settings.limits.scale
+    inverse = {kind: 1.0 / factor for kind, factor in scale if factor != 1.0}
     return robot.with_limits(scale=inverse) if inverse else robot

@@ -473,7 +473,10 @@ def _process_events(
 ) -> Iterator[tuple[float, str]]:
     """Yield the times, s, and instructions at which a process begins or ends, unless its part has such an event."""
     program = motion.task.program
-    named = dict(zip(part_names(program), program, strict=True))
+    events = {
+        name: part.events
+        for name, part in zip(part_names(program), program, strict=True)
+    }
     is_process = [phase.kind == "given speed" for phase in motion.phases]
     ends = [0.0, *motion.phase_ends.tolist()]
     changes = pairwise([False, *is_process, False])
@@ -483,8 +486,8 @@ def _process_events(
         stated = [
             event.name
             for part in motion.parts
-            if part.begin < inside < part.end and part.name in named
-            for event in named[part.name].events
+            if part.begin < inside < part.end
+            for event in events.get(part.name, ())
         ]
         if before != after and name in profile.events and name not in stated:
             yield time, profile.events[name]
