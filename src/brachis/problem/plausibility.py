@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
     """Check the positions and angles that a task states, in postures and along its paths, and the robots of parts."""
-    issues = {}
+    issues: dict[Issue, None] = {}
     for number, part in enumerate(problem.parts):
         of_parts = of_robot(part.robot) if problem.is_chain else ()
         for issue in (*_places_of_part(part), *of_parts):
