@@ -24,12 +24,13 @@ from brachis.optimise.path_phase import PathPhase
 from brachis.optimise.path_program import PathProgram
 from brachis.optimise.phase_timing import PhaseTiming
 from brachis.optimise.transcription import program_of
+from brachis.problem.plausibility import of_places
 from brachis.problem.program import bind_task
-from brachis.robot.from_task import robot_for
+from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.chain import find_batches
 from brachis.search.phase_plane import initial_guess
-from brachis.task import part_names, scene_during
+from brachis.task import ToolLimits, part_names, scene_during, task_with
 from support.cycle import CYCLE as GANTRY_CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
@@ -38,6 +39,7 @@ MASS = 2.0
 FORCE = 16.0
 """Of a slide, N."""
 HOME = [0.0, 0.5, 0.0, -1.2, 0.0, 1.0, 0.3]
+ARC = {"name": "arc_on"}
 SEAM = {
     "name": "seam",
     "path": [{"line": {"to": [0.5, 0.15, 0.4]}}],
@@ -240,6 +242,86 @@ def test_limits_of_a_part_hold_in_it_alone(slide):
     first, second = (part.duration for part in result.trajectory.parts)
     assert first == pytest.approx(0.5 / 0.5 + 0.5 * MASS / FORCE, rel=1e-3)
     assert second == pytest.approx(least_time(0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "robot, limits, velocity",
+    [
+        ({"speed_override": 0.25}, {"velocity": 2.0}, 0.5),
+        ({"speed_override": 0.25}, {"scale": {"velocity": 0.5}}, 0.25),
+        ({"limits": {"scale": {"velocity": 0.25}}}, {"velocity": {"x_axis": 2.0}}, 0.5),
+        ({"limits": {"scale": {"velocity": 0.25}}}, {"scale": {"velocity": 0.5}}, 1.0),
+        ({"limits": {"velocity": 0.25}}, {"acceleration": 100.0}, 0.25),
+    ],
+)
+def test_a_part_replaces_the_same_limits_and_no_factors(robot, limits, velocity):
+    task = task_with(
+        robot={"urdf": "gantry2", **robot},
+        start=[0.1, 0.1],
+        tool_limits={"speed": 0.2},
+        program=[
+            {
+                "move": {"joints": [0.9, 0.1]},
+                "limits": limits,
+                "tool_limits": {"acceleration": 100.0},
+            }
+        ],
+    )
+    (part,) = bind_task(robot_from_settings(task.robot), task).parts
+    assert part.robot.limits.velocity[0] == pytest.approx(velocity)
+    assert part.task.tool_limits == ToolLimits(speed=0.2, acceleration=100.0)
+
+
+@pytest.mark.parametrize(
+    "parts, key",
+    [
+        ([{"payload": {"mass": 60.0}}], "program[1].payload.mass"),
+        ([], "robot.payload.mass"),
+    ],
+)
+def test_the_payload_that_is_too_heavy_is_named(parts, key):
+    home = {"joints": HOME}
+    program = [{"move": {"joints": [0.3, *HOME[1:]]}}, *parts, {"move": home}]
+    robot = {"urdf": "iiwa14"} | ({} if parts else {"payload": {"mass": 60.0}})
+    task = task_with(robot=robot, start=home, program=program)
+    with pytest.raises(StartError) as caught:
+        bind_task(robot_from_settings(task.robot), task)
+    (remedy,) = caught.value.remedies
+    assert remedy.key == key
+
+
+@pytest.mark.parametrize(
+    "number, changes, text",
+    [
+        (
+            0,
+            {"limits": {"velocity": 1e-7}},
+            r"program: move 1: .*Set program\[0\].limits.velocity.x_axis in",
+        ),
+        (
+            1,
+            {"path": [{"line": {"by": [0.1, 0.2]}, "speed": 50.0}], "tool_limits": {}},
+            r"Lower program\[1\].path\[0\].speed to .* \(a plan with it was verified",
+        ),
+    ],
+)
+def test_keys_of_parts_are_named_in_advice_that_works(number, changes, text):
+    parts = list(GANTRY_CYCLE["program"])
+    parts[number] = {**parts[number], **changes}
+    with pytest.raises(brachis.BrachisError, match=text):
+        brachis.plan({**GANTRY_CYCLE, "program": parts})
+
+
+def test_figures_of_parts_are_checked_like_those_of_the_task():
+    parts = list(GANTRY_CYCLE["program"])
+    parts[0] = {"move": "next", "limits": {"velocity": {"x_axis": 5000.0}}}
+    parts[3] = {"payload": {"mass": 1500.0}}
+    task = task_with({**GANTRY_CYCLE, "program": parts})
+    issues = of_places(bind_task(robot_from_settings(task.robot), task))
+    assert [issue.where for issue in issues] == [
+        "program[0].limits.velocity.x_axis",
+        "program[3].payload.mass",
+    ]
 
 
 def test_two_paths_with_different_limits_meet(slide):
@@ -468,6 +550,15 @@ def test_a_free_order_visits_seams_along_the_way():
         ({"program": [SEAM], "task_space": "free"}, "a path needs a task space"),
         ({"program": [{"move": "nowhere"}]}, "this posture is not defined"),
         ({"program": [SEAM, {"move": "next"}], "order": "free"}, "cannot be free"),
+        ({"program": [SEAM], "order": "free"}, "or leave out order, and add moves"),
+        ({"program": [SEAM, {"payload": None}]}, "no motion follows this change"),
+        ({"program": [{**SEAM, "events": [ARC, ARC]}]}, "seam: an event occurs twice"),
+        ({"program": [{"dwell": -0.1}]}, "found -0.1; allowed: > 0, in s"),
+        ({"scene": [{"box": [0.1, -0.8, 0.1]}]}, "found -0.8; allowed: > 0, in m"),
+        (
+            {"program": [{**SEAM, "events": [{"name": "arc", "lead": 50}]}]},
+            "found 50; allowed: <= 10, in s",
+        ),
         ({"program": [{**SEAM, "path_frame": "part"}]}, "frame"),
         (
             {

@@ -13,9 +13,7 @@ from brachis.apps.controller import (
     bind_axes,
     load_profile,
     robot_with_profile,
-    scale_of,
     verify_run,
-    without_scale,
 )
 from brachis.common.progress import Listener, ignore
 from brachis.errors import BrachisError, InputError
@@ -23,8 +21,9 @@ from brachis.planner import RobotOrTask, plan, read_arguments
 from brachis.result import Result
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
+from brachis.robot.from_task import replace_limits
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import Source, TaskKeywords
+from brachis.task import LimitSpec, Source, TaskKeywords
 
 _ROUNDS = 4
 """Maximum number of further plans, each with lower limits than the previous one.
@@ -100,8 +99,6 @@ def plan_for_controller(
     if profile.rest == "full" and loaded.spline.vanishing < _FULL_REST:
         spline = loaded.spline.model_copy(update={"rest": "full"})
         loaded = loaded.model_copy(update={"spline": spline})
-    unscaled = without_scale(robot)
-    factors = scale_of(robot)
 
     def plan_and_run(
         robot: Robot, start_from: Result | None
@@ -122,8 +119,9 @@ def plan_for_controller(
         if not smaller:
             break
         report(f"run by {profile.title}: {'; '.join(run.failures)}; planning again")
-        factors |= {kind: factors.get(kind, 1.0) * smaller[kind] for kind in smaller}
-        robot = unscaled.with_limits(scale=factors)
+        scale = robot.settings.limits.scale
+        factors = {kind: smaller[kind] * getattr(scale, kind) for kind in smaller}
+        robot = replace_limits(robot, LimitSpec(scale=factors))
         try:
             result, run = plan_and_run(robot, result)
         except BrachisError:

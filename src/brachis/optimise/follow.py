@@ -394,7 +394,7 @@ class _Violations:
             factor = np.full_like(known, least)
             if limit in self._earlier:
                 before, narrowed = self._earlier[limit]
-                gain = (before - known).clip(min=np.finfo(float).tiny)
+                gain = (before - known).clip(min=np.finfo(float).eps)
                 factor = (narrowed / gain).clip(least, largest)
             factor[known > _SMALL] = 1.0
             excess = np.where(known > _UNCHANGED, factor * known, 0.0)

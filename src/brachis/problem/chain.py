@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from brachis.errors import BrachisError
 from brachis.problem.problem import Join, Problem
 from brachis.task import FREE, PATH_KEYS, BoundarySettings, Mark
 
@@ -32,6 +33,8 @@ class Section:
         Key of the part in the task; empty for a move without a given posture.
     segments : int
         Number of its segments of the path.
+    renamed : tuple of tuple of str
+        Keys of the task, such as ``robot.payload``, with the keys of the program that replace them.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Section:
     dwell: float = 0.0
     key: str = ""
     segments: int = 0
+    renamed: tuple[tuple[str, str], ...] = ()
 
 
 def key_in_program(
@@ -59,6 +63,9 @@ def key_in_program(
     interval : tuple of float, optional
         Interval of s in which something is wrong: the message names the part in its middle.
     """
+    renamed = _rename(key, sections)
+    if renamed != key:
+        return renamed
     head = key.partition(".")[0]
     if head in ("start", "end"):
         ends = sections if head == "end" else before
@@ -82,6 +89,30 @@ def key_in_program(
         middle = np.mean(interval)
         main = next(section for section in sections if section.s_end >= middle)
     return ": ".join(filter(None, ("program", main.name, key)))
+
+
+def _rename(text: str, sections: Sequence[Section]) -> str:
+    """Replace keys of the task in a text by those of the program."""
+    for key, replacement in sections[0].renamed:
+        text = re.sub(rf"(?<![\w.]){re.escape(key)}\b", replacement, text)
+    return text
+
+
+def name_keys(
+    error: BrachisError,
+    sections: Sequence[Section],
+    before: Sequence[Section] = (),
+    interval: tuple[float, float] | None = None,
+) -> None:
+    """Name the keys of the program in an error about some of its parts; see `key_in_program`."""
+    error.where = key_in_program(error.where or "", sections, before, interval)
+    if error.hint:
+        error.hint = _rename(error.hint, sections)
+    remedies = []
+    for remedy in error.remedies:
+        key = key_in_program(remedy.key, sections, before)
+        remedies.append(replace(remedy, key=key.rpartition(": ")[2]))
+    error.remedies = tuple(remedies)
 
 
 @dataclass(frozen=True, repr=False)
@@ -171,12 +202,16 @@ class ProblemChain(Problem):
         """The problems whose motions follow one another."""
         return self.chained
 
-    def key_of(
-        self, number: int, key: str, interval: tuple[float, float] | None = None
-    ) -> str:
-        """Return a key of a part, or a place in an interval of its s, as one of the program, for messages."""
+    def key_of(self, number: int, key: str) -> str:
+        """Return a key of a part as one of the program, for messages."""
         before = self.sections[number - 1] if number else ()
-        return key_in_program(key, self.sections[number], before, interval)
+        return key_in_program(key, self.sections[number], before)
+
+    def name_keys(self, number: int, error: BrachisError) -> None:
+        """Name the keys of the program in an error about a part."""
+        before = self.sections[number - 1] if number else ()
+        interval = getattr(error, "s_interval", None)
+        name_keys(error, self.sections[number], before, interval)
 
     def with_part(self, number: int, part: Problem) -> Problem:
         """Return the program with another part in place of the part with a number."""

@@ -42,12 +42,15 @@ if TYPE_CHECKING:
 
 
 def of_places(problem: Problem) -> tuple[Issue, ...]:
-    """Check the joint positions and tool angles that a task states, in postures and along its paths."""
-    return tuple(
-        replace(issue, where=problem.key_of(number, issue.where))
-        for number, part in enumerate(problem.parts)
-        for issue in _places_of_part(part)
-    )
+    """Check the positions and angles that a task states, in postures and along its paths, and the robots of parts."""
+    issues: dict[Issue, None] = {}
+    for number, part in enumerate(problem.parts):
+        of_parts = of_robot(part.robot) if problem.is_chain else ()
+        for issue in (*_places_of_part(part), *of_parts):
+            where = problem.key_of(number, issue.where)
+            if issue not in of_parts or where.startswith("program["):
+                issues[replace(issue, where=where)] = None
+    return tuple(issues)
 
 
 def _places_of_part(problem: Problem) -> list[Issue]:
@@ -202,7 +205,7 @@ def check_within_reach(problem: Problem) -> None:
         try:
             _check_path_within_reach(part)
         except PathError as error:
-            error.where = problem.key_of(number, error.where or "", error.s_interval)
+            problem.name_keys(number, error)
             raise
 
 

@@ -12,7 +12,13 @@ import numpy as np
 
 from brachis import ik
 from brachis.common.summary import Summary
-from brachis.errors import DecompositionError, StartError, UnknownNameError, check_names
+from brachis.errors import (
+    BrachisError,
+    DecompositionError,
+    StartError,
+    UnknownNameError,
+    check_names,
+)
 from brachis.kinematics import ClosedFormMap, Newton
 from brachis.limits import Limit, limits_of
 from brachis.path import (
@@ -153,11 +159,12 @@ class Problem(Summary):
         """The problems whose motions follow one another: only this one; see `brachis.problem.chain.ProblemChain`."""
         return (self,)
 
-    def key_of(
-        self, _number: int, key: str, _interval: tuple[float, float] | None = None
-    ) -> str:
+    def key_of(self, _number: int, key: str) -> str:
         """Return a key of a part as one of the task, for messages."""
         return key
+
+    def name_keys(self, _number: int, _error: BrachisError) -> None:
+        """Leave an error as it is; see `brachis.problem.chain.ProblemChain`."""
 
     def with_part(self, _number: int, part: Problem) -> Problem:
         """Return the problem with another part in place of the part with a number."""

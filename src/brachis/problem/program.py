@@ -17,16 +17,18 @@ from brachis.common import tolerances
 from brachis.errors import InputError, PathError, TaskError
 from brachis.path import OffPathError, Path, path_of, posture_hint
 from brachis.path.rotations import rotation_of
-from brachis.problem.chain import ProblemChain, Section, key_in_program
+from brachis.problem.chain import ProblemChain, Section, name_keys
 from brachis.problem.problem import Problem
 from brachis.robot import Robot, bind
 from brachis.robot.custom_limits import LimitModel
+from brachis.robot.from_task import replace_limits
 from brachis.task import (
     FREE,
     ApproachPart,
     BoundarySettings,
     DwellPart,
     LimitedPart,
+    LimitSpec,
     MovePart,
     PathPart,
     PayloadPart,
@@ -86,7 +88,6 @@ def bind_task(
     for number, (stretch, *postures) in enumerate(
         zip(stretches, begins, ends, strict=True)
     ):
-        changed = _robot_of(robot, stretch)
         before = problems[-1] if problems else None
         stated: dict[str, Any] = dict(zip(("start", "end"), postures, strict=True))
         begins_flying, ends_flying = flights[number : number + 2]
@@ -96,6 +97,7 @@ def bind_task(
         )
         previous = stretches[number - 1].sections if number else []
         with _in_program(task, stretch.sections, previous):
+            changed = _robot_of(robot, stretch)
             part_task = _task_of(stretch, changed, task, before, stated)
             problem = Problem.of(changed, part_task, own_limits).waiting(stretch.wait)
             tasks = _variants(stretch, part_task, problem.path)
@@ -142,7 +144,7 @@ def _in_program(
         error.put_advice(advice)
         raise
     except InputError as error:
-        error.where = key_in_program(error.where or "", sections, before)
+        name_keys(error, sections, before)
         raise
 
 
@@ -166,6 +168,7 @@ class _Stretch:
     payload: Payload | None
     scene: tuple[SceneBody, ...]
     parts: list[tuple[int, Part]] = field(default_factory=list)
+    payload_key: str = "robot.payload"
 
     def of(self, kind: type[Part]) -> list[Any]:
         """Return the parts of a kind."""
@@ -181,6 +184,13 @@ class _Stretch:
     @property
     def sections(self) -> list[Section]:
         """The parts as sections, before their ends along the path are known."""
+        renamed = [("robot.payload", self.payload_key)]
+        for part in self.of(LimitedPart)[:1]:
+            limits = part.limits or LimitSpec()
+            renamed += [
+                (f"robot.limits.{kind}", f"{self.key}.limits.{kind}")
+                for kind in without_defaults(limits)
+            ]
         return [
             Section(
                 part.name or "",
@@ -191,6 +201,7 @@ class _Stretch:
                 key="" if getattr(part, "move", "") == NEXT else f"program[{number}]",
                 segments=len(getattr(part, "path", ()))
                 or int(part.kind in ("approach", "retract")),
+                renamed=tuple(renamed),
             )
             for number, part in self.parts
         ]
@@ -246,14 +257,15 @@ def _settings(part: PathPart) -> dict[str, Any]:
 def _stretches(task: Task) -> Iterator[_Stretch]:
     """Yield the stretches of a program."""
     payload = task.robot.payload
+    key = "robot.payload"
     stretch = None
     for number, part in enumerate(task.program):
         if isinstance(part, PayloadPart):
             payload = part.payload
+            key = f"program[{number}].payload"
             continue
-        begun = _Stretch(
-            payload, scene_during(task.scene, task.program, number), [(number, part)]
-        )
+        scene = scene_during(task.scene, task.program, number)
+        begun = _Stretch(payload, scene, [(number, part)], key)
         if stretch is not None and stretch.goes_on_with(begun):
             stretch.parts += begun.parts
             continue
@@ -284,7 +296,7 @@ def _robot_of(robot: Robot, stretch: _Stretch) -> Robot:
         robot = robot.with_payload(**stated)
     for part in stretch.of(LimitedPart)[:1]:
         if part.limits is not None:
-            robot = robot.with_limits(**without_defaults(part.limits))
+            robot = replace_limits(robot, part.limits)
     return robot
 
 
@@ -303,12 +315,15 @@ def _task_of(
         )
     task = task.with_scene(stretch.scene)
     limited = stretch.of(LimitedPart)[0]
+    tool_limits = limited.tool_limits or ToolLimits()
+    stated_keys = tool_limits.model_dump(exclude_defaults=True)
+    own = {key: getattr(tool_limits, key) for key in stated_keys}
     changes: dict[str, Any] = {
         "program": (),
         "order": "given",
         "robot": robot.settings,
         **stated,
-        "tool_limits": limited.tool_limits or task.tool_limits,
+        "tool_limits": task.tool_limits.model_copy(update=own),
     }
     if isinstance(limited, MovePart):
         return _checked(task, changes)

@@ -30,6 +30,8 @@ from brachis.task import (
     RobotSettings,
     check_robot_settings,
 )
+from brachis.task.fields import merge
+from brachis.task.limit_kinds import LimitScale
 from brachis.task.limit_models import map_by_joint, without_defaults
 
 
@@ -179,6 +181,21 @@ def with_settings(robot: Robot, **changes: Any) -> Robot:
     if robot.tool_joints:
         changed = with_tool_joints(changed, robot.tool_joints)
     return replace(changed, limits=robot.limits, friction=robot.friction)
+
+
+def replace_limits(robot: Robot, limits: LimitSpec) -> Robot:
+    """Return the robot with other limits in place of its own; its factors apply to them unless they are replaced."""
+    settings = robot.settings
+    names = robot.urdf_joints
+    unscaled = replace(settings.limits, scale=LimitScale())
+    known = resolve_limits(unscaled, names, robot.urdf_limits[: len(names)])
+    factors = limits.scale.model_dump(exclude_defaults=True)
+    changes = without_defaults(limits)
+    changes["scale"] = settings.limits.scale.model_copy(update=factors)
+    spec = LimitSpec(**merge(vars(to_spec(known, names)), changes))
+    changed = settings.model_copy(update={"limits": spec})
+    same = Robot.from_settings(changed, robot.source, robot.urdf)
+    return with_tool_joints(same, robot.tool_joints) if robot.tool_joints else same
 
 
 def _to_settings(friction: Friction, joints: Sequence[int]) -> FrictionSettings:

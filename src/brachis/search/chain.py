@@ -414,8 +414,7 @@ class _ChainSearch:
             try:
                 of_variant = self._guesses(changed)
             except BrachisError as error:
-                interval = getattr(error, "s_interval", None)
-                error.where = self.problem.key_of(number, error.where or "", interval)
+                self.problem.name_keys(number, error)
                 errors.append(error)
                 continue
             guesses += [replace(guess, problem=variant) for guess in of_variant]

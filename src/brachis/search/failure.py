@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -331,8 +332,10 @@ def explain_no_motion(
         hint=advice + hint_end,
     )
     remedies = [
-        speed.lower_to(0.7 * speed.figure)
-        for part in problem.parts
+        replace(speed, key=problem.key_of(number, speed.key)).lower_to(
+            0.7 * speed.figure
+        )
+        for number, part in enumerate(problem.parts)
         for speed in speeds_of(part)
     ]
     return error.with_remedies(*remedies)

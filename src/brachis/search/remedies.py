@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +12,8 @@ from brachis.common import interrupts
 from brachis.common.deadline import Deadline
 from brachis.common.progress import ignore
 from brachis.errors import BrachisError, Remedy
-from brachis.problem.problem import Problem, decompositions_of
+from brachis.problem.problem import Decompositions
+from brachis.problem.program import bind_task
 from brachis.robot import Robot
 from brachis.robot.custom_limits import LimitModel
 from brachis.robot.from_task import robot_from_settings
@@ -103,8 +105,8 @@ def is_planned(
     """
     if max_batches:
         task = task_with(task, effort="single")
-    problem = Problem.of(robot, task, own_limits)
-    search = Search(problem, decompositions_of(problem, families), deadline, ignore)
+    problem = bind_task(robot, task, own_limits)
+    search = Search(problem, Decompositions(problem, families), deadline, ignore)
     with search.end_early():
         search.run(max_batches=max_batches)
     if search.best is not None and search.best.verified:
@@ -173,11 +175,11 @@ def _with_number(
 ) -> dict[str, Any]:
     """Return an unchecked task with a number changed; a number for all joints is first written joint by joint."""
     above, _, last = key.rpartition(".")
-    if last not in robot.joint_names or not above.startswith("robot.limits."):
+    if last not in robot.joint_names or ".limits." not in above:
         return with_keys(content, {key: value})
     setting: Any = content
-    for name in above.split("."):
-        setting = setting[name]
+    for name in re.findall(r"\w+", above):
+        setting = setting[int(name) if name.isdigit() else name]
     if isinstance(setting, int | float):
         setting = dict.fromkeys(robot.joint_names, setting)
     by_joint = setting if isinstance(setting, Mapping) else {}

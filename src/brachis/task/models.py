@@ -251,6 +251,8 @@ class Task(CheckedModel):
                 yield "boundary", why, "no speeds"
             yield from find_mistakes(self.program, self.order, self.start, self.end)
         elif self.path:
+            if self.order == "free":
+                yield "order", "only a program has an order", "given"
             yield from self._mistakes_at_the_start()
             yield from self._mistakes_in_the_path()
         else:

@@ -83,9 +83,9 @@ class LimitedPart(FlyingPart):
     """A part with limits of its own."""
 
     tool_limits: ToolLimits | None = None
-    """Limits on the tool in this part. Null: those of the task."""
+    """Limits on the tool in this part, in place of the same ones of the task."""
     limits: LimitSpec | None = None
-    """Joint limits in this part. Null: those of the robot."""
+    """Joint limits in this part, in place of the same ones of the robot; its factors apply to them too."""
 
 
 class PathPart(LimitedPart):
@@ -319,6 +319,11 @@ def _find_wrong_names(parts: Sequence[Part]) -> Iterator[Mistake]:
                 "a change of the payload takes no time",
                 "events of the part before or after",
             )
+        if len(set(part.events)) < len(part.events):
+            yield f"program[{number}].events", "an event occurs twice", "each once"
+    if parts and isinstance(parts[-1], PayloadPart):
+        key = f"program[{len(parts) - 1}].payload"
+        yield key, "no motion follows this change", "a part after it"
 
 
 def _find_wrong_end(parts: Sequence[Part], end: object) -> Iterator[Mistake]:
@@ -420,7 +425,7 @@ def _find_mistakes_if_free(parts: Sequence[Part]) -> Iterator[Mistake]:
         yield (
             "order",
             f"the order of {write_count(len(paths), 'path')} cannot be free",
-            f"2 to {_MOST_FREE} paths",
+            f"2 to {_MOST_FREE} paths; or leave out order, and add moves",
         )
     for number, part in enumerate(parts):
         if not isinstance(part, PathPart):

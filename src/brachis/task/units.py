@@ -12,7 +12,8 @@ _UNITS = {
         "m": """
             frames.xyz scene.position tool_offset.xyz mounting.xyz payload.com path_start.position
             path.blend line.to line.by line.length arc.center arc.via arc.to circle.center helix.center
-            helix.pitch spline.through bspline.control_points
+            helix.pitch spline.through bspline.control_points program.approach program.retract
+            scene.box scene.sphere cylinder.radius cylinder.length capsule.radius capsule.length
         """,
         "m/s": """
             path.speed boundary.start_speed boundary.end_speed tool_limits.speed process_speed.speed
@@ -30,7 +31,7 @@ _UNITS = {
         "kg m^2 (kg)": "friction.armature",
         "N m s/rad (N s/m)": "friction.viscous",
         "N m (N)": "friction.coulomb",
-        "s": "path.dwell search.time_limit solver.time_limit",
+        "s": "path.dwell program.dwell events.lead search.time_limit solver.time_limit",
         "rad": "path_start.rotation_vector to.rotation_vector",
         "": "speed.s",
         "rad/s": "tool_limits.angular_speed",

@@ -11,6 +11,7 @@ from brachis.apps.controller.run import slow_down
 from brachis.apps.export import write_for_controller
 from brachis.errors import InputError
 from brachis.trajectory import Event
+from support.cycle import CYCLE
 from support.effort import QUICK
 from support.slides import X, slides
 
@@ -35,6 +36,23 @@ def test_a_run_beyond_the_limits_of_one_part_fails(cycle):
     (failure,) = run.failures
     assert "velocity by differences" in failure
     assert "move 1" in failure
+
+
+def test_differences_go_on_where_parts_meet():
+    """A part that begins between two samples, or in motion, does not begin from rest."""
+    parts = [
+        {"move": {"joints": [0.3]}, "fly": True, "limits": {"acceleration": 3.0}},
+        {"move": {"joints": [0.7]}},
+        {"move": {"joints": [0.1]}},
+    ]
+    slide = slides([X], [16.0], 2.0, gravity=[0, 0, 0])
+    robot = {"limits": {"acceleration": 5.0}}
+    result = brachis.plan(slide, program=parts, start=[0.0], robot=robot, **QUICK)
+    run = brachis.verify_run(result, "kuka_rsi_4ms")
+    assert run.passed
+    checks = {check.name: check for check in run.checks}
+    rate = checks["acceleration by differences"]
+    assert rate.value == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_run_is_on_the_path_of_each_part(cycle):
@@ -136,6 +154,15 @@ def test_two_events_at_one_time_are_refused(cycle, tmp_path):
         instructions(both, tmp_path)
 
 
+def test_events_of_a_part_replace_those_of_its_process_speed(tmp_path):
+    parts = [dict(part) for part in CYCLE["program"]]
+    parts[1]["path"] = [{"line": {"by": [0.1, 0.2]}, "speed": 0.2}]
+    result = brachis.plan({**CYCLE, "program": parts})
+    lines = instructions(result, tmp_path)
+    switches = [line for line in lines if "$OUT[1]" in line]
+    assert [line.split()[-1] for line in switches] == ["TRUE", "FALSE"]
+
+
 def test_linear_moves_are_refused(cycle, tmp_path):
     with pytest.raises(
         InputError, match="found a program of several parts; allowed: joint"
@@ -150,8 +177,6 @@ def test_samples_name_events_in_comments(cycle, tmp_path):
 
 
 def test_a_program_is_planned_for_a_controller():
-    from support.cycle import CYCLE
-
     result, run = brachis.plan_for_controller("kuka_rsi_4ms", CYCLE)
     assert run.passed
     assert [part.kind for part in result.trajectory.parts] == [

@@ -157,7 +157,7 @@ def test_profiles_that_do_not_fit_are_refused(text, turn, tmp_path):
         ({"form": "program", "moves": "round"}, "no kind of moves named 'round'"),
         (
             {"form": "program", "time_tolerance": 1e-15},
-            "no program of positions is within",
+            "no program of positions is within.*Raise time_tolerance",
         ),
     ],
 )

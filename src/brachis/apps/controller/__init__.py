@@ -8,7 +8,7 @@ Examples
 """
 
 from brachis.apps.controller.axes import FACTORS, ControllerAxes, bind_axes
-from brachis.apps.controller.limits import robot_with_profile, scale_of, without_scale
+from brachis.apps.controller.limits import robot_with_profile
 from brachis.apps.controller.profile import (
     Language,
     Profile,
@@ -35,8 +35,6 @@ __all__ = [
     "nearest_on_path",
     "profile_names",
     "robot_with_profile",
-    "scale_of",
     "verify_run",
     "with_profile",
-    "without_scale",
 ]

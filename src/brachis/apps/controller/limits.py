@@ -9,8 +9,9 @@ from brachis.apps.controller.axes import ControllerAxes
 from brachis.apps.controller.profile import Profile
 from brachis.errors import InputError
 from brachis.robot import Robot
+from brachis.robot.from_task import replace_limits
 from brachis.robot.limits import MAGNITUDES
-from brachis.task import LIMIT_KINDS
+from brachis.task import LIMIT_KINDS, LimitSpec
 from brachis.task.limit_models import FROM_URDF, map_by_joint
 
 
@@ -31,6 +32,7 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
     unscaled = without_scale(robot)
     for kind in MAGNITUDES:
         stated = getattr(profile.limits, kind)
+        usual = LIMIT_KINDS[kind].usual
         needs_masses = LIMIT_KINDS[kind].needs_masses and not robot.has_masses
         if stated in (None, FROM_URDF) or needs_masses:
             continue
@@ -50,19 +52,18 @@ def robot_with_profile(robot: Robot, profile: Profile, axes: ControllerAxes) -> 
             number = robot.joint_names.index(joint)
             low, high = value if isinstance(value, tuple) else (-value, value)
             pair = (max(lower[number], low), min(upper[number], high))
+            if usual and usual.overridden:
+                override = robot.settings.speed_override
+                pair = (pair[0] / override, pair[1] / override)
             is_pair = LIMIT_KINDS[kind].form == "pair"
             changes.setdefault(kind, {})[joint] = pair if is_pair else pair[1]
     if not changes:
         return robot
-    return unscaled.with_limits(**changes).with_limits(scale=scale_of(robot))
-
-
-def scale_of(robot: Robot) -> dict[str, float]:
-    """Return the factors in ``robot.limits.scale`` that are not 1."""
-    return robot.settings.limits.scale.model_dump(exclude_defaults=True)
+    return replace_limits(robot, LimitSpec(**changes))
 
 
 def without_scale(robot: Robot) -> Robot:
     """Return a robot without the factors in ``robot.limits.scale``."""
-    inverse = {kind: 1.0 / factor for kind, factor in scale_of(robot).items()}
+    scale = robot.settings.limits.scale
+    inverse = {kind: 1.0 / factor for kind, factor in scale if factor != 1.0}
     return robot.with_limits(scale=inverse) if inverse else robot

@@ -15,6 +15,12 @@ from typing import Any
 import numpy as np
 
 from brachis.apps.controller.axes import ControllerAxes, bind_axes
+from brachis.apps.controller.differences import (
+    DERIVATIVES,
+    check_differences,
+    joint_ratios,
+    part_ratios,
+)
 from brachis.apps.controller.limits import robot_with_profile, without_scale
 from brachis.apps.controller.profile import Profile, load_profile
 from brachis.common.arrays import interpolate_columns, spread
@@ -32,8 +38,7 @@ from brachis.trajectory import (
 from brachis.verify import Check, Verification, VerifyOptions
 from brachis.verify.checks import check_joints
 from brachis.verify.limits import check_limits
-from brachis.verify.limits.tool import largest_speeds
-from brachis.verify.mechanics import joint_placements, real_tool_placements
+from brachis.verify.mechanics import joint_placements
 from brachis.verify.motion import CheckedMotion
 from brachis.verify.verify import path_errors, place_in_program
 
@@ -214,6 +219,10 @@ class _Run:
                     placed = place_in_program(self.motion, begin, check)
                     worst_checks[check.name] = placed
         checks = list(worst_checks.values())
+        if profile.is_sampled:
+            tolerance = self.motion.task.refinement.tolerance
+            differences = check_differences(run.times, joint_ratios(run), tolerance)
+            checks += [place_in_program(self.motion, 0.0, item) for item in differences]
         ratios = [check for check in checks if check.limit]
         errors = [check.value for check in checks if check.name == "path error"]
         if profile.rest == "full":
@@ -283,8 +292,10 @@ class _Run:
         """Check the path, and the limits."""
         ratios = check_limits(motion, self.own_limits)
         if self.profile.is_sampled:
-            differences = list(_check_differences(motion))
-            replaced = {check.limit for check in differences}
+            rows = part_ratios(motion)
+            tolerance = motion.options.ratio_tolerance
+            differences = list(check_differences(motion.states.t, rows, tolerance))
+            replaced = {check.limit for check in differences} | set(DERIVATIVES)
             ratios = [check for check in ratios if check.limit not in replaced]
             ratios += differences
         return [_check_path(motion, self.profile), *ratios]
@@ -374,52 +385,6 @@ def nearest_on_path(
         shift = np.sum(miss * along, axis=1) / np.sum(along**2, axis=1)
         s = np.clip(s + shift, *ends)
     return s
-
-
-def _check_differences(motion: CheckedMotion) -> Iterator[Check]:
-    """Check the differences of successive samples, divided by the period, as controllers do."""
-    t = motion.states.t
-    for limit, order, ratios, subjects in _list_ratios(motion):
-        if not ratios.any():
-            continue
-        row, column = map(int, np.unravel_index(np.argmax(ratios), ratios.shape))
-        yield Check(
-            f"{limit} by differences",
-            ratios[row, column],
-            1.0 + motion.options.ratio_tolerance,
-            "-",
-            subjects[column],
-            t[np.clip(row - order + 2, 0, len(t) - 1)],
-            limit=limit,
-        )
-
-
-def _list_ratios(
-    motion: CheckedMotion,
-) -> Iterator[tuple[str, int, np.ndarray, Sequence[str]]]:
-    """Yield limits, orders of differences, their ratios, (K', c), and their c subjects; 0 without a limit."""
-    robot = motion.robot
-    states = motion.states
-    names = robot.joint_names
-    period = states.t[1]
-    derivatives = [("velocity", 1, states.q)]
-    derivatives += [("acceleration", 2, states.q), ("jerk", 3, states.q)]
-    if robot.has_masses:
-        derivatives.append(("torque_rate", 1, states.tau))
-        heat = np.cumsum(states.tau**2, axis=0) / len(states.t)
-        yield "rms torque", 1, np.sqrt(heat) / robot.limits.rms_torque, names
-    for kind, order, values in derivatives:
-        lower, upper = robot.limits.both_ways(kind)
-        # The controller holds the first position before the motion, and the last one after it.
-        held = np.pad(values, ((order - 1, order - 1), (0, 0)), mode="edge")
-        rates = np.diff(held, order, axis=0) / period**order
-        ratios = np.maximum(rates / upper, rates / lower)
-        yield kind.replace("_", " "), order, ratios, names
-    tool, _ = real_tool_placements(robot, *states.joints)
-    steps = np.linalg.norm(np.diff(tool, axis=0), axis=1)
-    largest = largest_speeds(motion.task, states.s, np.maximum)
-    allowed = period * np.maximum(largest[1:], largest[:-1])
-    yield "tool speed", 1, (steps / allowed)[:, None], ("tool",)
 
 
 def _find_remedies(run: _Run) -> Iterator[str]:

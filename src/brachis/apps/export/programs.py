@@ -25,6 +25,7 @@ from brachis.common.arrays import apply_each
 from brachis.common.summary import Summary
 from brachis.errors import InputError, check_names
 from brachis.robot import Robot
+from brachis.task import part_names
 from brachis.trajectory import Trajectory
 
 BLEND = 0.25
@@ -266,11 +267,13 @@ class _Follower:
             nodes = self.choose(share * tolerance, share * time_tolerance)
             place, time = self.deviate(nodes, self.describe(nodes)["duration"])
             if len(nodes) > _MOST:
+                key = "time_tolerance" if time > time_tolerance else "tolerance"
                 raise InputError(
                     "no program of positions is within the tolerance",
                     where="tolerance",
                     found=f"{place:.3g} m, rad and {time:.3g} s with {_MOST} positions, rounded for the language",
                     allowed=f"{tolerance:g} m, rad and {time_tolerance:g} s",
+                    hint=f"Raise {key}",
                 )
             if place <= tolerance and time <= time_tolerance:
                 if self.is_linear:
@@ -468,11 +471,23 @@ def _events(motion: Trajectory, profile: Profile) -> dict[float, str]:
 def _process_events(
     motion: Trajectory, profile: Profile
 ) -> Iterator[tuple[float, str]]:
-    """Yield the times, s, and instructions at which a process begins or ends."""
+    """Yield the times, s, and instructions at which a process begins or ends, unless its part has such an event."""
+    program = motion.task.program
+    events = {
+        name: part.events
+        for name, part in zip(part_names(program), program, strict=True)
+    }
     is_process = [phase.kind == "given speed" for phase in motion.phases]
     ends = [0.0, *motion.phase_ends.tolist()]
     changes = pairwise([False, *is_process, False])
     for time, (before, after) in zip(ends, changes, strict=True):
         name = "process_on" if after else "process_off"
-        if before != after and name in profile.events:
+        inside = time + (_SAME_TIME if after else -_SAME_TIME)
+        stated = [
+            event.name
+            for part in motion.parts
+            if part.begin < inside < part.end
+            for event in events.get(part.name, ())
+        ]
+        if before != after and name in profile.events and name not in stated:
             yield time, profile.events[name]
