@@ -243,6 +243,35 @@ class _ChainSearch:
         parts = self.problem.parts
         paths = [number for number, part in enumerate(parts) if part.task_map.m]
         options = self._options_of_all(paths, begun)
+        order: list[int] = []
+        # Joint paths close to those before them in the best order are added, until this order stays.
+        while True:
+            chains = self._join_in_any_order(options, begun)
+            best = min(chains, key=lambda chain: chain.time)
+            last = order
+            order = [option.number for option in best.parts if option.guess]
+            if order == last or self.deadline.passed:
+                return chains
+            for option in self._fastest_in_order(order, begun):
+                options[paths.index(option.number)].append(option)
+
+    def _fastest_in_order(self, numbers: Sequence[int], begun: _Chain) -> set[_Option]:
+        """Return the joint paths of the fastest chains through paths in a given order."""
+        chains = [begun]
+        for number in numbers:
+            options = self._options(number, chains)
+            if begun.options or number != numbers[0]:
+                chains = self._move(chains, number - 1, options)
+            else:
+                chains = [begun.followed_by(option) for option in options]
+        chains = sorted(chains, key=lambda chain: chain.time)[:_KEPT]
+        return {option for chain in chains for option in chain.parts if option.guess}
+
+    def _join_in_any_order(
+        self, options: Sequence[Sequence[_Option]], begun: _Chain
+    ) -> list[_Chain]:
+        """Return the fastest chains through one option of each path."""
+        parts = self.problem.parts
         begins = [[begun.followed_by(option) for option in some] for some in options]
         if begun.options:
             roots = [{0: [begun]}]
@@ -252,7 +281,7 @@ class _ChainSearch:
             roots = [{1 << place: chains for place, chains in enumerate(begins)}]
         complete: list[_Chain] = []
         for visited_by in roots:
-            for visited in range((1 << len(paths)) - 1):
+            for visited in range((1 << len(options)) - 1):
                 chains = visited_by.pop(visited, [])
                 for place, some in enumerate(options):
                     if chains and not visited >> place & 1:

@@ -70,8 +70,8 @@ _OPTIONS = SolverOptions(
 )
 """Options that bound the effort of a solve."""
 _OF_INTERIOR = replace(_OPTIONS, max_iterations=20, first_step=0.01, damping=1.0)
-"""The same for an interior-point method. After 20 iterations, accelerations were at most 10 % above those after 60. With
-a damping of 0.1, limits were still exceeded after 60; with 10, accelerations were up to half as high again."""
+"""For an interior-point method. After 20 iterations, accelerations were at most 10 % above those after 60. With a
+damping of 0.1, limits were still exceeded after 60. With 10, accelerations were up to half as high again."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -221,11 +221,13 @@ def refine_smoothest(
 def smoothen(
     task: Task, fastest: SolvedProgram, deadline: Deadline
 ) -> np.ndarray | None:
-    """Return a motion, (v,), that is much smoother than a solution of a large program, and as fast; None if none is known."""
+    """Return a much smoother motion, (v,), that is as fast as a solution of a large program; None if none is known."""
     slower = task.spline.tolerance
     objective = least_acceleration(fastest.program, fastest.x, slower)
     program = fastest.program.with_objective(objective)
-    solve = _session(interior_solver(task.solver.name), deadline, ignore)
+    name = task.solver.name
+    backend = interior_solver(name) or solvers_for(name)[0]
+    solve = _session(backend, deadline.part(0.3), ignore)
     report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
     return report.x if report.status.usable else None
 

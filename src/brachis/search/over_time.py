@@ -156,7 +156,7 @@ def improve_timings(
     program: Program,
     paths: BetterPaths,
     session: SolverSession,
-    smooth: Callable[[SolvedProgram], np.ndarray | None],
+    smooth: Callable[[SolvedProgram], np.ndarray | None] | None,
 ) -> BetterTimings:
     """Solve over time from splines along timings, and time the joint path of the solution, and of a smoother one.
 
@@ -168,8 +168,9 @@ def improve_timings(
     paths : BetterPaths
         Joint paths of the program's phases.
     session : SolverSession
-    smooth : callable
-        ``smooth(solved)`` returns the smoothest motion that is as fast as a solution, (v,); None if it looks for none.
+    smooth : callable or None
+        ``smooth(solved)`` returns the smoothest motion, (v,), that is as fast as the solution of a large program, or
+        None.
 
     Returns
     -------
@@ -205,7 +206,8 @@ def improve_timings(
         return known
 
     fastest = time_motion(replace(unimproved, solved=solved), solved.x, 0.0)
-    x = smooth(solved)
+    is_large = session.choose_for_large(solved.program) is not None
+    x = smooth(solved) if smooth and is_large else None
     if x is None:
         return fastest
     smoothest = time_motion(fastest, x, tolerances.END_TIME)

@@ -72,8 +72,6 @@ _BEFORE_REFINEMENT = 0.5
 _IF_SHORT = 0.2
 """The same fraction if there is little time and splines are laid, which takes half a second. With 0.5, splines were
 laid too late."""
-_FOR_SMOOTHING = 0.3
-"""Maximum fraction of the remaining time for a smoother motion, before splines are laid along it."""
 _WORTH_REFINING = 0.05
 """Fraction of the time that refinement must save for a large program to be refined before splines are laid."""
 
@@ -224,14 +222,8 @@ def _finish_over_path(
     paths = improve_joint_paths(at_rest, guess.legs, session, tolerance, FINE)
     reports = (*candidate.reports, *paths.reports)
     session = shorten_solves(session)
-
-    def smooth(solved: SolvedProgram) -> np.ndarray | None:
-        """Return the smoothest motion of a large program that is as fast as its solution."""
-        is_large = session.choose_for_large(solved.program) is not None
-        if is_large and guess.problem.is_chain and task.search.least_motion:
-            return smoothen(task, solved, options.deadline.part(_FOR_SMOOTHING))
-        return None
-
+    is_smoothed = guess.problem.is_chain and task.search.least_motion
+    smooth = partial(smoothen, task, deadline=options.deadline) if is_smoothed else None
     retimed = improve_timings(guess, program, paths, session, smooth)
     reports = (*reports, *retimed.reports)
     least = retimed.t_end + guess.problem.dwell_time

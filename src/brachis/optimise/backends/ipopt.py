@@ -7,12 +7,13 @@ Hessian. https://coin-or.github.io/Ipopt
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from brachis.errors import UnreachableError
 from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_at
-from brachis.optimise.backends.protocol import SolverReport, SolveStatus
+from brachis.optimise.backends.protocol import Curvature, SolverReport, SolveStatus
 
 NAME = "ipopt"
 _RESTORATION = 1
@@ -20,7 +21,6 @@ _RESTORATION = 1
 _OPTIONS: dict[str, int | float | str] = {
     "print_level": 0,
     "sb": "yes",
-    "hessian_approximation": "limited-memory",
     # Including the approximation in the linear system takes half as long as correcting the solution afterwards.
     "limited_memory_aug_solver": "extended",
     "mu_strategy": "adaptive",
@@ -99,23 +99,15 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         return np.clip(bounds, -2e19, 2e19)  # IPOPT treats 1e19 as infinity
 
     known = program.curvature(x) if options.damping else None
-    nothing = np.array([], dtype=int)
-    entries = (nothing, nothing)
-    by_hessian: dict[str, str] = {}
+    entries = (np.array([], dtype=int),) * 2
+    hessian: dict[str, Any] = {}
     if known is not None:
-        at_start = known.hessian(x, 1.0, known.multipliers)
         # Entries that are zero at the start are left out. The Hessian is only an approximation.
-        entries = np.nonzero(np.tril(at_start) + np.eye(len(x)))
-        by_hessian["hessian_approximation"] = "exact"
-
-    def write_hessian(
-        point: np.ndarray, multipliers: np.ndarray, factor: float, out: np.ndarray
-    ) -> None:
-        """Write the known part of the Hessian, damped along its diagonal."""
-        full = known.hessian(point, factor, -multipliers)
-        damping = options.damping * np.median(full.diagonal())
-        out[:] = (full + damping * np.eye(len(x)))[entries]
-
+        at_start = known.hessian(x, 1.0, known.multipliers)
+        rows, columns = np.nonzero(np.tril(at_start) + np.eye(len(x)))
+        entries = rows, columns
+        hessian["eval_h"] = _damp(known, options.damping, entries)
+    approximation = "exact" if hessian else "limited-memory"
     backend = ipyopt.Problem(
         len(x),
         clip(program.x_lower),
@@ -129,11 +121,11 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         or_nan(monitor.gradient),
         or_nan(monitor.rows),
         or_nan(differentiate, 0.0),  # NaN at the first point ends the process
-        write_hessian if known else None,
         intermediate_callback=intermediate,
+        **hessian,
         ipopt_options={
             **_OPTIONS,
-            **by_hessian,
+            "hessian_approximation": approximation,
             **dict.fromkeys(_PUSHES, _PUSH * options.first_step),
             "tol": options.tolerance,
             "constr_viol_tol": options.tolerance,
@@ -146,3 +138,19 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
     status = _STATUS.get(int(code), SolveStatus.FAILED)
     message = f"return code {code}"
     return monitor.report(NAME, status, np.array(answer), -multipliers, message)
+
+
+def _damp(
+    known: Curvature, damping: float, entries: tuple[np.ndarray, np.ndarray]
+) -> Callable[[np.ndarray, np.ndarray, float, np.ndarray], None]:
+    """Return a function that writes entries of the known part of a Hessian, damped along its diagonal."""
+
+    def write(
+        point: np.ndarray, multipliers: np.ndarray, factor: float, out: np.ndarray
+    ) -> None:
+        """Write the entries at a point."""
+        hessian = known.hessian(point, factor, -multipliers)
+        added = damping * np.median(hessian.diagonal())
+        out[:] = (hessian + added * np.eye(len(point)))[entries]
+
+    return write
