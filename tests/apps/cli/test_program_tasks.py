@@ -35,7 +35,7 @@ def test_a_plan_prints_its_parts_and_has_them_in_its_json(run, task, tmp_path):
         assert f" {kind} " in row
         assert row.count("%") == 1
     assert "process_on at " in outcome.out
-    assert "only of parts with process speeds" in outcome.out
+    assert "the fastest motion is kept" in outcome.out
     data = json.loads((tmp_path / "out/result.json").read_text())
     assert [part["name"] for part in data["parts"]] == NAMES
     assert [event["name"] for event in data["events"]] == ["process_on", "process_off"]
