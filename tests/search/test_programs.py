@@ -29,6 +29,7 @@ from brachis.problem.program import bind_task
 from brachis.robot.from_task import robot_for, robot_from_settings
 from brachis.robot.plausibility import PlausibilityWarning
 from brachis.search.chain import find_batches
+from brachis.search.least_motion import least_acceleration
 from brachis.search.phase_plane import initial_guess
 from brachis.task import ToolLimits, part_names, scene_during, task_with
 from support.cycle import CYCLE as GANTRY_CYCLE
@@ -376,6 +377,25 @@ def test_no_joint_swings_on_a_seam_with_a_given_speed():
     # Each joint reaches its speed on the first and last millimetres.
     assert np.abs(accelerations).max() < 500.0
     assert np.sqrt((accelerations**2).mean(axis=0)).max() < 20.0
+
+
+def test_accelerations_of_parts_with_virtual_joints_and_without_are_one_objective(
+    cycle,
+):
+    optimum = cycle.candidate.optimum
+    sizes = {phase.joint_map.robot.n for phase in optimum.program.phases}
+    assert sizes == {7, 8}
+    objective = least_acceleration(optimum.program, optimum.x, 0.0)
+    assert len(objective.weights) == 7
+    program = optimum.program.with_objective(objective)
+    assert program.objective(optimum.x) == pytest.approx(1.0)
+    # In half of the time, accelerations are four times as high.
+    faster = program.scale_time(optimum.x, 0.5)
+    assert program.objective(faster) == pytest.approx(16.0)
+    step = 1e-6 * np.random.default_rng(1).normal(size=len(optimum.x))
+    x = optimum.x
+    change = program.objective(x + step) - program.objective(x - step)
+    assert program.gradient(x) @ step == pytest.approx(0.5 * change, rel=1e-4)
 
 
 def test_pairs_of_a_body_that_is_there_for_a_time_can_be_left_out():

@@ -79,7 +79,7 @@ def finish_by_parts(
     known = replace(candidate, guess=replace(guess, problem=chain))
     done = verify(known, candidate.reports, _together(finished), motion)
     if isinstance(done, FinishedCandidate):
-        return replace(done, is_smoothest=True)
+        return replace(done, is_smoothed=True)
     return done
 
 

@@ -144,10 +144,10 @@ def _solve(
         status = "the fastest motion is not verified"
     elif deadline.passed:
         status = "no time was left"
-    elif fastest.is_smoothest and (fastest.problem.is_chain or not task.search.slower):
-        status = "the motion is already the smoothest one that is as fast"
+    elif fastest.is_smoothed and (fastest.problem.is_chain or not task.search.slower):
+        status = "the motion was smoothed while it was planned"
     elif count > _MANY and not task.search.slower:
-        status = f"the fastest motion is kept: with {count} variables no smoother motion is looked for"
+        status = f"the fastest motion is kept: {count} variables are too many to look for a smoother one"
     if status:
         return keep_fastest(fastest, status)
     soon = deadline.part(0.5)
@@ -213,7 +213,7 @@ def refine_smoothest(
             with_end_time = smoothest.refined.program.with_objective(EndTime())
             refined = replace(smoothest.refined, program=with_end_time)
             return replace(
-                smoothest, refined=refined, optimum=fastest, is_smoothest=True
+                smoothest, refined=refined, optimum=fastest, is_smoothed=True
             )
     return None
 
@@ -223,12 +223,7 @@ def smoothen(
 ) -> np.ndarray | None:
     """Return a much smoother motion, (v,), that is as fast as a solution of a large program; None if none is known."""
     slower = task.spline.tolerance
-    objective = least_acceleration(fastest.program, fastest.x, slower)
-    program = fastest.program.with_objective(objective)
-    name = task.solver.name
-    backend = interior_solver(name) or solvers_for(name)[0]
-    solve = _session(backend, deadline.part(0.3), ignore)
-    report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
+    _, _, report = _solve_once(task, fastest, slower, deadline.part(0.3), ignore)
     return report.x if report.status.usable else None
 
 
@@ -239,22 +234,14 @@ def _solve_for_smoothest(
     deadline: Deadline,
     listener: Listener,
 ) -> tuple[Solve, Program, SolverReport]:
-    """Solve for the smoothest motion that is as fast, or slower by a fraction of up to `slower`.
+    """Solve for the smoothest motion as `_solve_once` does, again and again while this gains much.
 
-    Returns
-    -------
-    solve : callable
-        Function that solves in refinement rounds.
-    program : Program
-    report : SolverReport
+    The function that is returned solves in refinement rounds.
     """
     slower -= _KEPT_BACK
-    objective = least_acceleration(fastest.program, fastest.x, slower)
-    program = fastest.program.with_objective(objective)
-    name = task.solver.name
-    interior = interior_solver(name) if program.variables > _MANY else None
-    solve = _session(interior or solvers_for(name)[0], deadline, listener)
-    report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
+    solve, program, report = _solve_once(task, fastest, slower, deadline, listener)
+    objective = program.minimised
+    assert isinstance(objective, LeastAcceleration)
     # The solver ends when it gains little of the first value, at which a motion that swings is far from the smoothest.
     while report.status.usable and _LEAST < report.objective < _MUCH_SMOOTHER:
         weights = objective.weights / np.sqrt(report.objective)
@@ -265,6 +252,30 @@ def _solve_for_smoothest(
         report = replace(again, objective=program.objective(again.x))
     # Refinement rounds begin close to their solution, so they may end sooner.
     return replace(solve, options=replace(solve.options, patience=2)), program, report
+
+
+def _solve_once(
+    task: Task,
+    fastest: SolvedProgram,
+    slower: float,
+    deadline: Deadline,
+    listener: Listener,
+) -> tuple[SolverSession, Program, SolverReport]:
+    """Solve once for the smoothest motion that is as fast, or slower by a fraction of up to `slower`.
+
+    Returns
+    -------
+    solve : SolverSession
+    program : Program
+    report : SolverReport
+    """
+    objective = least_acceleration(fastest.program, fastest.x, slower)
+    program = fastest.program.with_objective(objective)
+    name = task.solver.name
+    interior = interior_solver(name) if program.variables > _MANY else None
+    solve = _session(interior or solvers_for(name)[0], deadline, listener)
+    report = solve(program, program.scale_time(fastest.x, 1.0 + slower))
+    return solve, program, report
 
 
 def _reason(report: SolverReport) -> str:

@@ -124,14 +124,14 @@ class BetterTimings:
         The fastest known timings, one for each phase of the program.
     solved : SolvedProgram or None
         The motion over time; None if the solve gave none.
-    is_smoothest : bool
+    is_smoothed : bool
         Whether the joint paths are those of the smoothest motion that is as fast as `solved`.
     """
 
     program: Program
     timings: Sequence[PhaseTiming | None]
     solved: SolvedProgram | None = None
-    is_smoothest: bool = False
+    is_smoothed: bool = False
 
     @property
     def t_end(self) -> float:
@@ -211,7 +211,7 @@ def improve_timings(
     if x is None:
         return fastest
     smoothest = time_motion(fastest, x, tolerances.END_TIME)
-    return replace(smoothest, is_smoothest=smoothest is not fastest)
+    return replace(smoothest, is_smoothed=smoothest is not fastest)
 
 
 def _violation_of_postures(program: Program, x: np.ndarray) -> float:

@@ -245,7 +245,7 @@ def _finish_over_path(
             candidate, retimed.program, retimed.timings, reports, options
         )
         if isinstance(laid, FinishedCandidate) and solved is not None:
-            return replace(laid, optimum=solved, is_smoothest=retimed.is_smoothest)
+            return replace(laid, optimum=solved, is_smoothed=retimed.is_smoothed)
         return laid
 
     def refine() -> Candidate | None:

@@ -392,15 +392,15 @@ class FinishedCandidate(Candidate):
         The last program, and its solution.
     optimum : SolvedProgram
         The program whose multipliers tell what limits cost. This is the last one or, if splines were laid along the
-        timing of a joint path, the program over time that improved this joint path. If `is_smoothest`, the fastest
+        timing of a joint path, the program over time that improved this joint path. If `is_smoothed`, the fastest
         motion, which is not refined.
     trajectory : Trajectory
     verification : Verification
         Verification of the trajectory.
     not_completed : str
         See `RankedCandidate`.
-    is_smoothest : bool
-        Whether the motion is the smoothest one that is as fast as the optimum.
+    is_smoothed : bool
+        Whether a smoother motion that is as fast as the optimum was looked for while it was planned.
 
     Examples
     --------
@@ -417,7 +417,7 @@ class FinishedCandidate(Candidate):
     trajectory: Trajectory
     verification: Verification
     not_completed: str = ""
-    is_smoothest: bool = False
+    is_smoothed: bool = False
 
     @property
     def t_end(self) -> float:

@@ -61,6 +61,18 @@ def test_the_optimum_on_an_ellipsoid_is_found_in_few_iterations(known):
     assert report.iterations < 0.5 * solve(None).iterations
 
 
+def test_ipopt_uses_the_known_part_if_it_is_damped():
+    (ipopt,) = solvers_for("ipopt")
+    start = 0.1 * np.ones(SIZE) / np.sqrt(SIZE)
+    plain, damped = (
+        ipopt.solve(ellipsoid(1.0), start, SolverOptions(1e-8, damping=damping), None)
+        for damping in (0.0, 1e-3)
+    )
+    assert damped.status.usable
+    assert_allclose(COSTS @ damped.x, COSTS @ OPTIMUM, rtol=1e-6)
+    assert damped.iterations < 0.5 * plain.iterations
+
+
 def test_steps_teach_the_missing_curvature():
     problem = ellipsoid(0.7)
     known = problem.curvature(None)

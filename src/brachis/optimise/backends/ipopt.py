@@ -7,7 +7,6 @@ Hessian. https://coin-or.github.io/Ipopt
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from brachis.optimise.backends.monitor import Function, SolveMonitor, objective_
 from brachis.optimise.backends.protocol import Curvature, SolverReport, SolveStatus
 
 NAME = "ipopt"
+Hessian = Callable[[np.ndarray, np.ndarray, float, np.ndarray], None]
+"""Function that writes entries of a Hessian at a point, with multipliers of the rows and of the objective."""
 _RESTORATION = 1
 """IPOPT's mode in which it ignores the objective and looks for a feasible point."""
 _OPTIONS: dict[str, int | float | str] = {
@@ -99,15 +100,7 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         return np.clip(bounds, -2e19, 2e19)  # IPOPT treats 1e19 as infinity
 
     known = program.curvature(x) if options.damping else None
-    entries = (np.array([], dtype=int),) * 2
-    hessian: dict[str, Any] = {}
-    if known is not None:
-        # Entries that are zero at the start are left out. The Hessian is only an approximation.
-        at_start = known.hessian(x, 1.0, known.multipliers)
-        rows, columns = np.nonzero(np.tril(at_start) + np.eye(len(x)))
-        entries = rows, columns
-        hessian["eval_h"] = _damp(known, options.damping, entries)
-    approximation = "exact" if hessian else "limited-memory"
+    entries, hessian = _damp(known, options.damping, x)
     backend = ipyopt.Problem(
         len(x),
         clip(program.x_lower),
@@ -122,10 +115,10 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
         or_nan(monitor.rows),
         or_nan(differentiate, 0.0),  # NaN at the first point ends the process
         intermediate_callback=intermediate,
-        **hessian,
+        eval_h=hessian,
         ipopt_options={
             **_OPTIONS,
-            "hessian_approximation": approximation,
+            "hessian_approximation": "limited-memory" if known is None else "exact",
             **dict.fromkeys(_PUSHES, _PUSH * options.first_step),
             "tol": options.tolerance,
             "constr_viol_tol": options.tolerance,
@@ -141,9 +134,17 @@ def run(monitor: SolveMonitor, x: np.ndarray) -> SolverReport:
 
 
 def _damp(
-    known: Curvature, damping: float, entries: tuple[np.ndarray, np.ndarray]
-) -> Callable[[np.ndarray, np.ndarray, float, np.ndarray], None]:
-    """Return a function that writes entries of the known part of a Hessian, damped along its diagonal."""
+    known: Curvature | None, damping: float, x: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray], Hessian | None]:
+    """Return the places of the known part of a Hessian, and a function that writes it, damped along its diagonal.
+
+    Places where it is zero at the start x, (v,), are left out. The Hessian is only an approximation.
+    """
+    nothing = np.array([], dtype=int)
+    if known is None:
+        return (nothing, nothing), None
+    at_start = known.hessian(x, 1.0, known.multipliers)
+    rows, columns = np.nonzero(np.tril(at_start) + np.eye(len(x)))
 
     def write(
         point: np.ndarray, multipliers: np.ndarray, factor: float, out: np.ndarray
@@ -151,6 +152,6 @@ def _damp(
         """Write the entries at a point."""
         hessian = known.hessian(point, factor, -multipliers)
         added = damping * np.median(hessian.diagonal())
-        out[:] = (hessian + added * np.eye(len(point)))[entries]
+        out[:] = hessian[rows, columns] + added * (rows == columns)
 
-    return write
+    return (rows, columns), write
